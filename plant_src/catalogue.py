@@ -36,7 +36,7 @@ _FILES = {
 
 def multirotor_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a multirotor. Raises InputError with all problems of its data."""
-    from .vehicles.common.inertia import inertia_of
+    from .vehicles.common.shapes import inertia_of
     from .vehicles.multirotor import interface
     from .vehicles.multirotor.airframe import MAX_ROTORS, MultirotorReader
 
@@ -57,7 +57,7 @@ def multirotor_model(name: str, data: Mapping[str, Any]) -> Model:
 
 def submerged_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a submerged vehicle. Raises InputError with all problems of its data."""
-    from .vehicles.common.inertia import inertia_of
+    from .vehicles.common.shapes import inertia_of
     from .vehicles.submerged import interface
     from .vehicles.submerged.craft import MAX_THRUSTERS, SubmergedReader
 
@@ -78,7 +78,7 @@ def submerged_model(name: str, data: Mapping[str, Any]) -> Model:
 
 def surface_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a floating vessel. Raises InputError with all problems of its data."""
-    from .vehicles.common.inertia import inertia_of
+    from .vehicles.common.shapes import inertia_of
     from .vehicles.surface_vessel import interface
     from .vehicles.surface_vessel.surface_vessel import SurfaceVesselReader
     from .vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
@@ -169,12 +169,13 @@ def _named_links(data: Mapping[str, Any]) -> Iterator[Problem]:
 
 
 def _strider() -> Model:
+    from .vehicles.common.interface import PLANAR_STATES
     from .vehicles.strider import interface, parameters
 
     return Model(
         "strider",
         interface.VARIABLES,
-        interface.STATES,
+        PLANAR_STATES,
         parameters.BODY,
         parameters.CRASH_SPEED,
         is_vessel=True,

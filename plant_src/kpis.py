@@ -226,19 +226,6 @@ def _no_touchdown(result: Result, vehicle: str) -> NoValue:
     return NoValue(f"{vehicle} touches no vessel after a flight")
 
 
-__all__ = [
-    "cross_track",
-    "descent",
-    "failures",
-    "final",
-    "landing",
-    "motors",
-    "touchdown",
-    "tracking",
-    "waypoints",
-]
-
-
 @better(reached="higher", all_reached="higher", time="lower")
 @units(time="s")
 @no_value("{vehicle} did not reach this waypoint")

@@ -119,11 +119,38 @@ def _hankel(response: np.ndarray, lags: np.ndarray) -> np.ndarray:
 _CHANGE = 2.0**-12
 #: difference of the responses to two perturbations, as a fraction of the response, from which it is
 #: no linear one
-NONLINEAR = 1e-3
+_NONLINEAR = 1e-3
+#: largest error of the realized impulse responses, as a fraction of their peaks, without a hint
+MAX_MISFIT = 1e-4
+#: hint at the causes of a larger error
+_NO_EQUILIBRIUM = (
+    "the operating point is no equilibrium (see cosim trim), or a mode changes during the "
+    "response (choose another --at or a "
+    "shorter --duration)"
+)
 #: part of the response after which a second perturbation begins
 _LATER = 8
 #: strength, as a fraction of the largest one, below which a response may be rounding
 _WEAK = 1e-6
+
+
+def validity_notes(nonlinearity: float, error: float, misfit_text: str) -> list[str]:
+    """Return hints about the validity of a linear model.
+
+    Args:
+        nonlinearity: See `ImpulseResponses`.
+        error: Largest error of the responses of the model, as a fraction of their peaks.
+        misfit_text: Hint at an error that is too large.
+    """
+    notes = []
+    if nonlinearity > _NONLINEAR:
+        notes.append(
+            f"the responses to two perturbations differ by {nonlinearity:.2g} of their peak: a "
+            "limit, a mode or contact acts"
+        )
+    if error > MAX_MISFIT:
+        notes.append(f"{misfit_text}: {_NO_EQUILIBRIUM}")
+    return notes
 
 
 class ImpulseResponses(NamedTuple):

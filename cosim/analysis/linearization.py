@@ -16,23 +16,14 @@ import numpy as np
 from ..core.errors import InputError
 from .experiment import Channels, Experiment, Scenario
 from .impulse_response import (
-    NONLINEAR,
-    ImpulseResponses,
     Realization,
     measure_impulse_responses,
     misfit,
     realize,
+    validity_notes,
 )
 from .linear_model import LinearModel
 
-#: largest error of the realized impulse responses, as a fraction of their peaks, without a hint
-MAX_MISFIT = 1e-4
-#: hint at the causes of a larger error
-NO_EQUILIBRIUM = (
-    "the operating point is no equilibrium (see cosim trim), or a mode changes during the "
-    "response (choose another --at or a "
-    "shorter --duration)"
-)
 #: part of an output's row in C that no other output has, as a fraction of the row, from which it
 #: counts as a state
 _INDEPENDENT = 1e-6
@@ -93,7 +84,9 @@ def linearize(
         responses = measure_impulse_responses(experiment, len(channels))
     held = responses.outputs[1:]
     realization = realize(held if continuous else responses.outputs, order, responses.variation)
-    notes = _notes(realization, held if continuous else responses.outputs, responses)
+    error = misfit(realization, held if continuous else responses.outputs)
+    text = f"the model reproduces the measured responses only to {error:.2g} of their peak"
+    notes = validity_notes(responses.nonlinearity, error, text)
     if continuous:
         realization = to_continuous(realization, experiment.step)
         peaks = np.abs(held).max(0)
@@ -142,26 +135,6 @@ def by_directional_derivatives(
     matrices = found[:n, :n], found[:n, n:], found[n:, :n], found[n:, n:]
     state_names = [f"{component}.{name}" for name in states]
     return LinearModel(*matrices, list(channels), list(outputs), state_names, None, experiment.time)
-
-
-def _notes(
-    realization: Realization, measured: np.ndarray, responses: ImpulseResponses
-) -> list[str]:
-    """Return hints about the validity of the model."""
-    error = misfit(realization, measured)
-    notes = []
-    if responses.nonlinearity > NONLINEAR:
-        share = f"{responses.nonlinearity:.2g}"
-        notes.append(
-            f"the responses to two perturbations differ by {share} of their peak: a limit, a mode "
-            "or contact acts"
-        )
-    if error > MAX_MISFIT:
-        notes.append(
-            f"the model reproduces the measured responses only to {error:.2g} of their peak: "
-            f"{NO_EQUILIBRIUM}"
-        )
-    return notes
 
 
 def to_continuous(realization: Realization, step: float) -> Realization:

@@ -17,9 +17,14 @@ from ..core.errors import InputError, did_you_mean
 from ..core.system import Endpoint
 from ..engine.perturbation import PerturbationTarget
 from .experiment import Experiment, Scenario
-from .impulse_response import NONLINEAR, measure_impulse_responses, misfit, realize
+from .impulse_response import (
+    MAX_MISFIT,
+    measure_impulse_responses,
+    misfit,
+    realize,
+    validity_notes,
+)
 from .linear_model import LinearModel
-from .linearization import MAX_MISFIT, NO_EQUILIBRIUM
 
 #: signal of an estimated frequency response
 Excitation = Literal["sines", "chirp"]
@@ -210,24 +215,11 @@ def _measure(name: str, experiment: Experiment) -> LoopResponse | None:
     states = [f"x{i + 1}" for i in range(len(realization.a))]
     closed = LinearModel(*realization, [name], [name], states, experiment.step, experiment.time)
     loop = LoopResponse(name, closed, error)
-    return replace(loop, closed=replace(closed, notes=_notes(loop, measured.nonlinearity)))
-
-
-def _notes(loop: LoopResponse, nonlinearity: float) -> list[str]:
-    """Return hints about the validity of a model."""
-    notes = []
-    if nonlinearity > NONLINEAR:
-        share = f"{nonlinearity:.2g}"
-        notes.append(
-            f"the responses to two perturbations differ by {share} of their peak: a limit, a mode "
-            "or contact acts"
-        )
-    if loop.error > MAX_MISFIT:
-        found = f"the model reproduces the measured response only to {loop.error:.2g} of its peak"
-        notes.append(
-            f"{found}{'' if loop.is_valid else ', so its margins mean nothing'}: {NO_EQUILIBRIUM}"
-        )
-    return notes
+    text = f"the model reproduces the measured response only to {error:.2g} of its peak"
+    if not loop.is_valid:
+        text += ", so its margins mean nothing"
+    notes = validity_notes(measured.nonlinearity, error, text)
+    return replace(loop, closed=replace(closed, notes=notes))
 
 
 def estimate_loop(

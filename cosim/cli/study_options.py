@@ -68,10 +68,8 @@ def open_run_store(folder: Path, retry: bool) -> RunStore:
     Raises:
         InputError: if the folder cannot be used.
     """
-    from ..results.files import check_writable
     from ..studies.execution.run_store import RunStore
 
-    check_writable(folder)
     run_store = RunStore(folder, retry)
     if count := run_store.unreadable_lines:
         click.echo(

@@ -14,10 +14,10 @@ from typing import Any
 from ..api.arguments import expect, is_integer
 from ..core.resources import available_processors
 from ..core.size_limits import MAX_RUNS
-from ..results.files import check_writable
 from .execution.run_store import RunStore
 from .execution.worker_pool import LocalRunner
 from .regression import RegressionOutcome, default_folder, run_regressions
+from .study import Study
 from .summary.sweep_files import SweepSummary, write_sweep_files
 from .sweep import Sweep, SweepRow
 from .tune import Trial, Tuning, write_tuning_files
@@ -127,11 +127,10 @@ def sweep(
     """
     _check_arguments(study, output_dir, workers, max_runs)
     loaded = Sweep.from_file(study, max_runs)
-    folder = Path(output_dir) if output_dir else Path("runs") / loaded.study_file.spec.name
-    check_writable(folder)
+    folder = _folder(output_dir, loaded.study)
     with RunStore(folder, retry_failed) as run_store:
         if any(key not in run_store for key in loaded.keys):
-            with LocalRunner(loaded.study.context, workers or available_processors()) as runner:
+            with _runner(loaded.study, workers) as runner:
                 loaded.run(run_store, runner, lambda _: None)
         loaded.check_names(run_store)
         return SweepResult(
@@ -167,10 +166,8 @@ def tune(
     """
     _check_arguments(study, output_dir, workers, max_runs)
     loaded = Tuning.from_file(study, max_runs)
-    folder = Path(output_dir) if output_dir else Path("runs") / loaded.spec.name
-    check_writable(folder)
-    runner = LocalRunner(loaded.study.context, workers or available_processors())
-    with RunStore(folder, retry_failed) as run_store, runner:
+    folder = _folder(output_dir, loaded.study)
+    with RunStore(folder, retry_failed) as run_store, _runner(loaded.study, workers) as runner:
         best = loaded.run(run_store, runner, lambda _: None)
     write_tuning_files(loaded, folder)
     return TuningResult(best, loaded.trials, folder)
@@ -202,10 +199,8 @@ def worst_case(
     """
     _check_arguments(study, output_dir, workers, max_runs)
     search = WorstCase.from_file(study, max_runs)
-    folder = Path(output_dir) if output_dir else Path("runs") / search.spec.name
-    check_writable(folder)
-    runner = LocalRunner(search.study.context, workers or available_processors())
-    with RunStore(folder, retry_failed) as run_store, runner:
+    folder = _folder(output_dir, search.study)
+    with RunStore(folder, retry_failed) as run_store, _runner(search.study, workers) as runner:
         search.run(run_store, runner, lambda _: None)
     return WorstCaseResult(search.worst, search.attempts, write_worst_case_files(search, folder))
 
@@ -248,6 +243,14 @@ def regress(
     _check_count("jobs", jobs)
     paths = [Path(each) for each in given] or [default_folder()]
     return list(run_regressions(paths, update, Path(output_dir), jobs or available_processors()))
+
+
+def _folder(output_dir: str | Path | None, study: Study) -> Path:
+    return Path(output_dir) if output_dir else Path("runs") / study.spec.name
+
+
+def _runner(study: Study, workers: int | None) -> LocalRunner:
+    return LocalRunner(study.context, workers or available_processors())
 
 
 def _check_arguments(study: Any, output_dir: Any, workers: Any, max_runs: Any) -> None:

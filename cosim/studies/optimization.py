@@ -59,29 +59,43 @@ def _differential_evolution(evaluate: Evaluator, start: Sequence[float], spec: M
     )
 
 
-def _scipy_minimizer(method: str) -> Callable[[Evaluator, Sequence[float], MethodSpec], None]:
-    def search(evaluate: Evaluator, start: Sequence[float], spec: MethodSpec) -> None:
-        from scipy.optimize import minimize
+def _minimize_locally(evaluate: Evaluator, start: Sequence[float], spec: MethodSpec) -> None:
+    """Search by a method of `scipy.optimize.minimize` that needs no derivatives."""
+    from scipy.optimize import minimize
 
-        options = {"maxfev": spec.evaluations}
-        bounds = [(0.0, 1.0)] * len(start)
-        minimize(
-            lambda point: evaluate([point.tolist()])[0],
-            start,
-            method=method,
-            bounds=bounds,
-            options=options,
-        )
-
-    return search
+    minimize(
+        lambda point: evaluate([point.tolist()])[0],
+        start,
+        method=spec.kind.replace("_", "-"),
+        bounds=[(0.0, 1.0)] * len(start),
+        options={"maxfev": spec.evaluations},
+    )
 
 
-#: optimization methods: search from a start within the unit cube
-METHODS: Mapping[str, Callable[[Evaluator, Sequence[float], MethodSpec], None]] = {
-    "differential_evolution": _differential_evolution,
-    "nelder_mead": _scipy_minimizer("Nelder-Mead"),
-    "powell": _scipy_minimizer("Powell"),
-}
+def search(
+    evaluate: Callable[[Sequence[Mapping[str, float]]], list[float]],
+    parameters: Sequence[ParameterSpec],
+    spec: MethodSpec,
+) -> None:
+    """Search for the values of parameters with the lowest rank.
+
+    Args:
+        evaluate: returns the ranks of points; each point is given by its values by name.
+        parameters: the parameters with their bounds and start values.
+        spec: the method.
+    """
+
+    def evaluate_coordinates(points: Sequence[Sequence[float]]) -> list[float]:
+        return evaluate([parameter_values(parameters, point) for point in points])
+
+    is_global = spec.kind == "differential_evolution"
+    method = _differential_evolution if is_global else _minimize_locally
+    method(evaluate_coordinates, _start_coordinates(parameters), spec)
+
+
+def start_values(parameters: Sequence[ParameterSpec]) -> dict[str, float]:
+    """Return the values of parameters by name at the start of the search."""
+    return parameter_values(parameters, _start_coordinates(parameters))
 
 
 def parameter_values(
@@ -104,7 +118,7 @@ def parameter_settings(
     return settings
 
 
-def start_coordinates(parameters: Sequence[ParameterSpec]) -> list[float]:
+def _start_coordinates(parameters: Sequence[ParameterSpec]) -> list[float]:
     """Return the start of the search in the unit cube.
 
     A parameter without a start value begins in the middle.
@@ -136,11 +150,6 @@ class Constraint:
 
     left: Expression
     right: Expression
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the KPIs and parameters on both sides."""
-        return [*self.left.names, *self.right.names]
 
     def violation(self, values: Mapping[str, float]) -> float:
         """Return by how much the constraint is violated.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -17,6 +17,7 @@ from ..core.errors import InputError, Problem, did_you_mean, nearest_file
 from ..core.size_limits import MAX_RUNS, require_at_most
 from ..results.checks import Number
 from ..scenario import load_scenario
+from ..scenario.evaluation_schema import CheckSpec
 from ..scenario.file_paths import find_scenario
 from ..scenario.json_document import Document, json_path, pointer_keys, read_document
 from ..scenario.named_functions import kpi_name_problem
@@ -77,10 +78,10 @@ class Study:
         combined = {**self.spec.settings, **settings}
         return Job(run_key(self.bundle.digest, combined), combined)
 
-    @cached_property
-    def checks(self) -> list[dict[str, Any]]:
-        """Checks of the scenario with the common settings."""
-        return [check.model_dump(exclude_none=True) for check in self._scenario.spec.checks]
+    def criteria(self, success: Sequence[CheckSpec] | None) -> list[dict[str, Any]]:
+        """Return the checks of success; None: those of the scenario with the common settings."""
+        checks = self._scenario.spec.checks if success is None else success
+        return [check.model_dump(exclude_none=True) for check in checks]
 
     @cached_property
     def _scenario(self) -> Scenario:

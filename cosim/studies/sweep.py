@@ -96,12 +96,7 @@ class Sweep:
     @cached_property
     def criteria(self) -> list[dict[str, Any]]:
         """Checks that a run must meet to be a success."""
-        success = self.study_file.spec.success
-        return (
-            self.study.checks
-            if success is None
-            else [check.model_dump(exclude_none=True) for check in success]
-        )
+        return self.study.criteria(self.study_file.spec.success)
 
     def missed(self, kpis: Mapping[str, Number]) -> list[CheckOutcome]:
         """Return the criteria that these KPIs do not meet.

@@ -35,12 +35,11 @@ from .execution.run_store import RunStore
 from .factor_schema import TRIAL_COLUMNS
 from .optimization import (
     INFEASIBLE_RANK,
-    METHODS,
     Constraint,
     parameter_settings,
-    parameter_values,
     parse_constraint,
-    start_coordinates,
+    search,
+    start_values,
 )
 from .schema import TuneSpec
 from .study import (
@@ -157,11 +156,9 @@ class Tuning:
             InputError: before the first run for a parameter or case that cannot be set; after the
                 first runs for unknown names in the objective or a constraint.
         """
-        start = start_coordinates(self.spec.parameters)
-        self.study.check_jobs(runner, self._jobs(parameter_values(self.spec.parameters, start)))
+        self.study.check_jobs(runner, self._jobs(start_values(self.spec.parameters)))
 
-        def evaluate(points: Sequence[Sequence[float]]) -> list[float]:
-            parameters = [parameter_values(self.spec.parameters, point) for point in points]
+        def evaluate(parameters: Sequence[Mapping[str, float]]) -> list[float]:
             run_pending(
                 chain.from_iterable(map(self._jobs, parameters)),
                 run_store,
@@ -174,7 +171,7 @@ class Tuning:
                 self._check_names()
             return [trial.rank for trial in trials]
 
-        METHODS[self.spec.method.kind](evaluate, start, self.spec.method)
+        search(evaluate, self.spec.parameters, self.spec.method)
         self._check_names()
         return min(self.trials, key=lambda trial: trial.rank)
 

@@ -20,7 +20,7 @@ from ..scenario.nested_systems import extending_scenario
 from .execution.bundle import cosim_fingerprint
 from .execution.job import Job, Record
 from .execution.run_store import RunStore
-from .optimization import METHODS, parameter_settings, parameter_values, start_coordinates
+from .optimization import parameter_settings, search, start_values
 from .schema import WorstCaseSpec
 from .study import (
     CheckingRunner,
@@ -96,12 +96,7 @@ class WorstCase:
     @cached_property
     def criteria(self) -> list[dict[str, Any]]:
         """Checks that a run must meet."""
-        success = self.spec.success
-        return (
-            self.study.checks
-            if success is None
-            else [check.model_dump(exclude_none=True) for check in success]
-        )
+        return self.study.criteria(self.spec.success)
 
     @property
     def counterexamples(self) -> list[Attempt]:
@@ -127,16 +122,11 @@ class WorstCase:
         Raises:
             InputError: A parameter cannot be set, or a check names no KPI of any run.
         """
-        start = start_coordinates(self.spec.parameters)
-        jobs = [self._job(parameter_values(self.spec.parameters, start))]
-        self.study.check_jobs(
-            runner,
-            jobs,
-            self.study.unknown_criteria(check.kpi for check in self.spec.success or ()),
-        )
+        unknown = self.study.unknown_criteria(check.kpi for check in self.spec.success or ())
+        start = start_values(self.spec.parameters)
+        self.study.check_jobs(runner, [self._job(start)], unknown)
 
-        def evaluate(points: Sequence[Sequence[float]]) -> list[float]:
-            values = [parameter_values(self.spec.parameters, point) for point in points]
+        def evaluate(values: Sequence[Mapping[str, float]]) -> list[float]:
             run_pending(map(self._job, values), run_store, runner, observe)
             attempts = [
                 self._attempt(each, run_store[self._job(each).key], run_store.units)
@@ -145,7 +135,7 @@ class WorstCase:
             self.attempts += attempts
             return [-each.severity for each in attempts]
 
-        METHODS[self.spec.method.kind](evaluate, start, self.spec.method)
+        search(evaluate, self.spec.parameters, self.spec.method)
         if self.observed_kpis.runs:
             evaluate_checks(self.observed_kpis.kpis, self.criteria)
 

@@ -59,7 +59,10 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, **_: object) -> str:
-    """Remove the backslashes before bars in code, which only GitHub's tables need, and the words for the tests."""
+    """Remove the backslashes before bars in code, and the words for the tests.
+
+    Only GitHub's tables need these backslashes.
+    """
     return _MANNER.sub(r"\1", _CODE.sub(lambda code: code[0].replace(r"\|", "|"), markdown))
 
 
@@ -75,10 +78,13 @@ def on_post_template(output_content: str, template_name: str, **_: object) -> st
 
 
 def repository_files(generated: Mapping[str, str]) -> list[str]:
-    """Return the documents of the repository and all files that they link to, as paths relative to its root.
+    """Return the documents of the repository and all files that they link to.
+
+    Paths are relative to its root.
 
     Args:
-        generated: texts of the generated pages by path; the files that they link to are returned too.
+        generated: texts of the generated pages by path; the files that they link to are returned
+            too.
 
     Raises:
         FileNotFoundError: A document links to another document that does not exist.

@@ -15,14 +15,18 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
     Columns that are empty in all rows are left out; `|` in a cell is escaped.
     """
-    rows = [tuple(_BAR.sub(r"\|", " ".join(cell.split())) for cell in row) for row in rows]
-    used = [i for i in range(len(header)) if any(row[i] for row in rows)]
-    lines = [
-        [header[i] for i in used],
-        ["---" for _ in used],
-        *([row[i] for i in used] for row in rows),
-    ]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n" if rows else ""
+    columns = list(zip(header, *rows, strict=True))
+    used = [map(_cell, column) for column in columns if any(column[1:])]
+    if not used:
+        return ""
+    first, *others = zip(*used, strict=True)
+    lines = [first, ["---"] * len(used), *others]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def _cell(text: str) -> str:
+    """Return the text of a cell in one line, with escaped bars."""
+    return _BAR.sub(r"\|", " ".join(text.split()))
 
 
 def code(text: object) -> str:

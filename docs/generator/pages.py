@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import groupby
+from itertools import chain, groupby
 from pathlib import Path
 
 from markdown_parts import code, page, plain, table
@@ -94,13 +94,9 @@ def _model_section(entry: Entry) -> str:
 def _variable_rows(variables: Iterable[Variable], causality: str) -> Iterator[tuple[str, ...]]:
     for variable in variables:
         if variable.causality == causality:
-            unit = (
-                variable.unit.name
-                if variable.unit
-                else "1"
-                if variable.type.startswith("Float")
-                else variable.type
-            )
+            unit = "1" if variable.type.startswith("Float") else variable.type
+            if variable.unit:
+                unit = variable.unit.name
             start = "" if variable.start is None or causality == "output" else f"{variable.start:g}"
             yield code(variable.name), plain(unit), start, plain(variable.description)
 
@@ -118,7 +114,7 @@ def kpis_page() -> str:
         CATALOGUE["kpis"](), key=lambda entry: entry.name.rpartition(":")[0]
     ):
         parts.append(f"## {file}")
-        parts += [part for entry in entries for part in _kpi_parts(entry)]
+        parts += chain.from_iterable(map(_kpi_parts, entries))
     return page("KPIs", *parts)
 
 

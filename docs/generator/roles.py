@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -72,12 +73,8 @@ def _group_titles(roles: Iterable[RoleSpec]) -> dict[Rows, str]:
 
 
 def _role_section(name: str, role: RoleSpec, titles: Mapping[Rows, str]) -> str:
-    kinds: dict[str, Mapping[str, Source]] = {"input": role.inputs, "output": role.outputs}
-    rows = (
-        _row(kind, variable, source, titles)
-        for kind, each in kinds.items()
-        for variable, source in each.items()
-    )
+    rows = [_row("input", *each, titles) for each in role.inputs.items()]
+    rows += [_row("output", *each, titles) for each in role.outputs.items()]
     signals = table(("name", "kind", "unit", "meaning"), rows)
     return "\n\n".join(
         filter(
@@ -93,15 +90,15 @@ def _role_section(name: str, role: RoleSpec, titles: Mapping[Rows, str]) -> str:
 
 
 def parameter_table(role: str, parameters: Mapping[str, str | ParameterSpec]) -> str:
-    """Return the table of a role's parameters, with the number of shipped scenarios that set each."""
+    """Return the table of a role's parameters.
+
+    A column counts the shipped scenarios that set each.
+    """
     if not parameters:
         return ""
-    settings = [
-        found
-        for file in sorted((resources.root() / "scenarios").glob("*.json"))
-        if (found := settings_of(role, file))
-    ]
-    counts = Counter(name for found in settings for name in found)
+    files = sorted((resources.root() / "scenarios").glob("*.json"))
+    settings = list(filter(None, (settings_of(role, file) for file in files)))
+    counts = Counter(chain.from_iterable(settings))
     header = ("parameter", "type", "unit", "start", f"scenarios (of {len(settings)})", "meaning")
     rows = (
         (code(name), *_parameter_cells(source, counts[name])) for name, source in parameters.items()
@@ -111,18 +108,17 @@ def parameter_table(role: str, parameters: Mapping[str, str | ParameterSpec]) ->
 
 def _parameter_cells(source: str | ParameterSpec, count: int) -> tuple[str, ...]:
     spec = ParameterSpec(unit=source, description="") if isinstance(source, str) else source
-    start = (
-        ""
-        if spec.start is None
-        else str(spec.start).lower()
-        if isinstance(spec.start, bool)
-        else f"{spec.start:g}"
-    )
+    start = "" if spec.start is None else f"{spec.start:g}"
+    if isinstance(spec.start, bool):
+        start = str(spec.start).lower()
     return spec.type, plain(spec.unit), start, str(count), plain(spec.description)
 
 
 def settings_of(role_name: str, scenario: Path) -> set[str]:
-    """Return the names of the variables that a scenario sets or connects in the component with the role; empty without one."""
+    """Return the names of the variables of a role that a scenario sets or connects.
+
+    They belong to the component with the role; there are none without it.
+    """
     role = read_role(role_name)
     nothing = CandidateInterface(inputs={}, outputs={}, parameters={})
     substitution = ControllerSubstitution(

@@ -31,7 +31,7 @@ def scenario_keys_page() -> str:
 
 
 def world_keys_page() -> str:
-    """Return the page with the arguments of the shipped plant, and the functions of its 3-D scenes."""
+    """Return the page with the arguments of the shipped plant and the functions of its scenes."""
     return page(
         "Arguments of the plant",
         'A scenario gives these arguments to the component `{"python": '
@@ -69,7 +69,10 @@ def study_keys_page() -> str:
 
 
 def _sections(title: str, schema: Schema, known: Collection[str] = ()) -> Iterator[str]:
-    """Yield a section for the keys of a file, and one for each kind of object in it that is not in `known`."""
+    """Yield a section for the keys of a file, and one for each kind of object in it.
+
+    Kinds in `known` are left out.
+    """
     yield _section(title, schema)
     for name, part in sorted(schema.get("$defs", {}).items()):
         if name not in known and "properties" in part:

@@ -13,8 +13,7 @@ import numpy as np
 from ..catalogue import MODELS
 from ..json_reader import Numbers
 from ..physics.bullet import create_compound_shape, pybullet, set_dynamics
-from ..vehicles.common.inertia import principal_axes
-from ..vehicles.common.shapes import quaternion_from_matrix
+from ..vehicles.common.shapes import principal_axes, quaternion_from_matrix
 from ..vehicles.strider import parameters as strider
 from ..vehicles.strider.parameters import RUDDER_ARM
 

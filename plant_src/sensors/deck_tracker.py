@@ -24,7 +24,7 @@ class DeckTracker(SignalComponent):
     """Filter with fixed gains for position and velocity of a deck.
 
     It is an alpha-beta filter for delayed measurements (Bar-Shalom, Li and Kirubarajan, "Estimation
-    with Applications to Tracking and Navigation", 2001, section 6.5). Between measurements the
+    with Applications to Tracking and Navigation", 2001, chapter 6). Between measurements the
     position is extrapolated with the velocity. A GNSS fix corrects position and velocity, a marker
     measurement corrects the position, each by its gain times the error at the time of the sample.
     The pose of the vehicle at that time converts the marker measurement to the world frame. Near

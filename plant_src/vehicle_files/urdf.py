@@ -18,7 +18,7 @@ import numpy as np
 from cosim.core.errors import InputError, Problem, did_you_mean
 
 from ..catalogue import NAMED_LISTS
-from ..vehicles.common.inertia import inertia_problems
+from ..vehicles.common.shapes import inertia_problems
 from ..vehicles.common.vehicle_reader import QuantityReader
 from . import mesh_import
 from .mesh_import import ImportedVehicle, box_triangles, cylinder_triangles, sphere_triangles

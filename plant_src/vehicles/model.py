@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import islice
+from itertools import chain, islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -78,7 +78,7 @@ class Model:
 
     @property
     def rotor_disc(self) -> tuple[Vector, float] | None:
-        """Centre (m, body frame) and radius (m) of the disc that contains all rotors of a multirotor."""
+        """Centre (m, body frame) and radius (m) of the disc of all rotors of a multirotor."""
         return self.airframe.rotor_disc if self.airframe else None
 
     def body_with(self, parameters: Mapping[str, float]) -> Body:
@@ -120,32 +120,32 @@ class Model:
     @cached_property
     def input_count(self) -> int:
         """Number of inputs of the equations, without those that the environment writes."""
-        inputs = [
-            variable for variable in self.layout or self.interface if variable.causality == "input"
+        return sum(len(variable.scalar_names) for variable in self._equation_inputs)
+
+    @property
+    def _equation_inputs(self) -> list[Variable]:
+        """Inputs of the equations, without those that the environment writes."""
+        return [
+            variable
+            for variable in self.layout or self.interface
+            if variable.causality == "input" and variable.name not in ENVIRONMENT_INPUTS
         ]
-        return sum(
-            len(variable.scalar_names)
-            for variable in inputs
-            if variable.name not in ENVIRONMENT_INPUTS
-        )
 
     @cached_property
     def input_places(self) -> list[slice]:
-        """Consecutive parts of the inputs of the equations that belong to the inputs of the interface, in order."""
-        counts = {
-            variable.name: len(variable.scalar_names)
-            for variable in self.variables
-            if variable.causality == "input"
-        }
+        """Consecutive parts of the inputs of the equations that belong to the interface, in order.
+
+        The equations have longer arrays than the vehicle, so its inputs lie in several parts.
+        """
+        counts = {variable.name: len(variable.scalar_names) for variable in self.interface}
         places, end = list[slice](), 0
-        for variable in self.layout or self.variables:
-            if variable.causality == "input" and variable.name not in ENVIRONMENT_INPUTS:
-                start, count = end, counts.get(variable.name, 0)
-                end += len(variable.scalar_names)
-                if count and places and places[-1].stop == start:
-                    places[-1] = slice(places[-1].start, start + count)
-                elif count:
-                    places.append(slice(start, start + count))
+        for variable in self._equation_inputs:
+            start, count = end, counts.get(variable.name, 0)
+            end += len(variable.scalar_names)
+            if count and places and places[-1].stop == start:
+                places[-1] = slice(places[-1].start, start + count)
+            elif count:
+                places.append(slice(start, start + count))
         return places
 
     def equation_parameters(self, values: Sequence[float]) -> list[float]:
@@ -171,14 +171,11 @@ class Model:
 
     def slots(self, causality: Causality) -> list[str]:
         """Return the names of the real scalars of a causality, in order."""
-        return [
-            slot for variable in self.real_variables(causality) for slot in variable.scalar_names
-        ]
+        names = [variable.scalar_names for variable in self.real_variables(causality)]
+        return [*chain.from_iterable(names)]
 
     def start_values(self, causality: Causality) -> list[float]:
         """Return the start values of the real scalars of a causality, in order."""
-        return [
-            float(start)
-            for variable in self.real_variables(causality)
-            for start in np.ravel(variable.start)
-        ]
+        starts = [np.ravel(variable.start) for variable in self.real_variables(causality)]
+        values: list[float] = np.concatenate([[], *starts]).astype(float).tolist()
+        return values

@@ -26,12 +26,10 @@ def ring_system(fmu: Path, size: int) -> System:
     inputs = [
         variable.name for variable in file.description.variables if variable.causality == "input"
     ]
-    pairs = zip(names, [*names[1:], *names[:1]], strict=True)
-    connections = [
-        Connection(Endpoint(a, f"y{name[1:]}"), Endpoint(b, name))
-        for a, b in pairs
-        for name in inputs
-    ]
+    connections = []
+    for a, b in zip(names, [*names[1:], *names[:1]], strict=True):
+        for name in inputs:
+            connections.append(Connection(Endpoint(a, f"y{name[1:]}"), Endpoint(b, name)))
     return System(
         {name: create_component(file, name) for name in names}, connections, (tuple(names),)
     )

@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from operator import truediv
 from statistics import median
 from time import perf_counter, process_time
 
@@ -27,16 +28,16 @@ class MedianCost:
 
 def measure_rounds(contenders: Mapping[str, Cost], rounds: int = ROUNDS) -> list[MedianCost]:
     """Measure all contenders once in every round; ratios refer to the first contender."""
-    costs = [{name: cost() for name, cost in contenders.items()} for _ in range(rounds)]
-    first = next(iter(contenders))
-    return [
-        MedianCost(
-            name,
-            median(row[name] for row in costs),
-            median(row[name] / row[first] for row in costs),
-        )
-        for name in contenders
-    ]
+    costs: dict[str, list[float]] = {name: [] for name in contenders}
+    for _ in range(rounds):
+        for name, cost in contenders.items():
+            costs[name].append(cost())
+    first = costs[next(iter(contenders))]
+    medians = []
+    for name, own in costs.items():
+        ratio = median(map(truediv, own, first))
+        medians.append(MedianCost(name, median(own), ratio))
+    return medians
 
 
 def print_heading(title: str, unit: str = "CPU us per step") -> None:

@@ -95,11 +95,9 @@ def read_subject(path: Path, folder: Path) -> Subject:
 def _kinds(root: ElementTree.Element, version: str) -> str:
     if version.startswith("1"):
         implementation = root.find("Implementation")
-        return (
-            "ME"
-            if implementation is None
-            else ("CS" if implementation.find("CoSimulation_StandAlone") is not None else "tool")
-        )
+        if implementation is None:
+            return "ME"
+        return "CS" if implementation.find("CoSimulation_StandAlone") is not None else "tool"
     kinds = {"CoSimulation": "CS", "ModelExchange": "ME", "ScheduledExecution": "SE"}
     return "+".join(short for name, short in kinds.items() if root.find(name) is not None)
 

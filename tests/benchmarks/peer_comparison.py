@@ -23,6 +23,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import isnan, nan
+from operator import attrgetter
 from pathlib import Path
 from statistics import median
 
@@ -182,9 +183,8 @@ class Comparison:
 
 
 def median_cost(costs: Sequence[Cost]) -> Cost:
-    return Cost(
-        *(median(getattr(cost, field) for cost in costs) for field in ("cpu", "wall", "last"))
-    )
+    columns = zip(*map(attrgetter("cpu", "wall", "last"), costs), strict=True)
+    return Cost(*map(median, columns))
 
 
 def failure_reason(error: subprocess.SubprocessError) -> str:

@@ -90,13 +90,9 @@ def plain_loop(
 
 
 def _get(fmu: Any, version: str, variable: Any) -> Any:
-    kind = (
-        variable.type
-        if variable.type != "Enumeration"
-        else "Int64"
-        if version == "3"
-        else "Integer"
-    )
+    kind = variable.type
+    if kind == "Enumeration":
+        kind = "Int64" if version == "3" else "Integer"
     value = getattr(fmu, f"get{kind}")([variable.valueReference])[0]
     return value.decode() if isinstance(value, bytes) and kind == "String" else value
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -112,11 +113,7 @@ def largest_difference(found: Mapping[str, Any], expected: Mapping[str, np.ndarr
         if len(values) != len(others):
             return np.inf
         if values.dtype.kind not in "biuf":
-            texts, other_texts = (
-                [v.hex() if isinstance(v, bytes) else str(v) for v in column]
-                for column in (values, others)
-            )
-            largest = largest if texts == other_texts else np.inf
+            largest = largest if _texts(values) == _texts(others) else np.inf
         else:
             words = (
                 [str(v).lower() in ("true", "1") for v in others]
@@ -163,8 +160,13 @@ def compare(path: Path, published: Path, interface: str, method: Any) -> str:
     return " | ".join([*cells, *["-"] * (3 - len(cells))])
 
 
+def _texts(column: np.ndarray) -> list[str]:
+    return [value.hex() if isinstance(value, bytes) else str(value) for value in column]
+
+
 def _scalars(path: Path) -> set[str]:
-    return {scalar for v in FmuFile(path).description.variables for scalar in v.scalar_names}
+    variables = FmuFile(path).description.variables
+    return set(chain.from_iterable(variable.scalar_names for variable in variables))
 
 
 def main() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -35,7 +36,7 @@ def test_importer_and_c_limit_step_the_same_ring(version, tmp_path):
             cpu_per_step(
                 ring_system(fmu, 4),
                 100,
-                [f"s{i}.y{j}" for i in range(4) for j in (1, 2, 3)],
+                [f"s{i}.y{j}" for i, j in product(range(4), (1, 2, 3))],
                 executor,
             )
             > 0

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -40,8 +41,7 @@ def ring(fmu: Path, size: int, stages: list[list[str]], width: int) -> dict[str,
         "components": {name: {"fmu": fmu.name} for name in names},
         "connections": [
             {"from": f"{a}.y{k}", "to": f"{b}.u{k}"}
-            for a, b in zip(names, [*names[1:], *names[:1]], strict=True)
-            for k in range(1, width + 1)
+            for (a, b), k in product(pairwise([*names, names[0]]), range(1, width + 1))
         ],
         "algorithm": {"stages": stages or [names]},
     }

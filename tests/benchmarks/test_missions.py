@@ -119,10 +119,8 @@ def with_pairs(count: int) -> dict[str, Any]:
         waypoints = [x + east for x in usv["parameters"]["waypoint_x"]]
         components[f"uav{i}"] = uav
         components[f"usv{i}"] = usv | {"parameters": usv["parameters"] | {"waypoint_x": waypoints}}
-        connections += [
-            {end: _renamed(name, i) for end, name in connection.items()}
-            for connection in demo["connections"]
-        ]
+        for connection in demo["connections"]:
+            connections.append({end: _renamed(name, i) for end, name in connection.items()})
     stages = [[name for name in components if name != "plant"], ["plant"]]
     times = {key: demo[key] for key in ("start_time", "stop_time", "step_size")}
     algorithm = {"kind": "staged", "stages": stages}

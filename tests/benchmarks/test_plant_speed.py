@@ -7,6 +7,7 @@ Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_plant_speed.py
 from __future__ import annotations
 
 import ctypes
+from collections import Counter
 from collections.abc import Callable, Mapping
 from time import process_time
 from typing import Any
@@ -31,9 +32,8 @@ FLYING, LANDED = 5.0, 0.3249  # height of the quadcopter (m)
 ABOVE_WAVES = 0.55  # from which it drops onto a deck in waves (m)
 WEATHER = {"seed": 7, "sea_state": 3, "wind": {"speed": 5.0, "turbulence": {}}}
 DRAG = {
-    f"{part}_drag.{axis}": value
-    for part, value in (("rotor", 5e-5), ("body", 0.02))
-    for axis in "xyz"
+    **dict.fromkeys((f"rotor_drag.{axis}" for axis in "xyz"), 5e-5),
+    **dict.fromkeys((f"body_drag.{axis}" for axis in "xyz"), 0.02),
 }
 #: largest cost of one pair per step (us) on an idle machine
 LIMITS = {
@@ -80,16 +80,10 @@ class BoundWorld:
         variables = [
             variable for variable in self.world.variables if variable.causality == causality
         ]
-        dtypes = dict.fromkeys(variable.dtype for variable in variables)
-        return Ports(
-            variables,
-            {
-                dtype: np.zeros(
-                    sum(len(v.scalar_names) for v in variables if v.dtype == dtype), dtype
-                )
-                for dtype in dtypes
-            },
-        )
+        sizes: Counter[np.dtype[Any]] = Counter()
+        for variable in variables:
+            sizes[variable.dtype] += len(variable.scalar_names)
+        return Ports(variables, {dtype: np.zeros(size, dtype) for dtype, size in sizes.items()})
 
     def run(self, steps: int) -> float:
         """Return the CPU time (us) per step."""

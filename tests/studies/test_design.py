@@ -1,6 +1,7 @@
 """Designs: the points that result from factors and seeds."""
 
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -52,9 +53,8 @@ def test_a_full_factorial_design_has_all_combinations_and_seeds_vary_fastest():
         {"name": "b", "set": ["y.b", "/b"], "values": [1, 2, 3]},
         seeds={"set": "/seed", "first": 7, "count": 2},
     )
-    assert [tuple(p.labels.values()) for p in points] == [
-        (a, b, s) for a in "pq" for b in (1, 2, 3) for s in (7, 8)
-    ]
+    expected = list(product("pq", (1, 2, 3), (7, 8)))
+    assert [tuple(p.labels.values()) for p in points] == expected
     assert points[3].settings == {"x.a": "p", "y.b": 2, "/b": 2, "/seed": 8}
     assert len(points) == 12
 

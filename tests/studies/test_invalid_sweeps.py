@@ -257,7 +257,8 @@ def test_invalid_settings_are_found_before_the_first_run(lag):
         ("$.factors[1].set", 'found "high"'),
         ("$.factors[2]", "components/lga"),
     ):
-        assert any(all(word in line for word in words) for line in lines), done.err
+        found = [line for line in lines if words[0] in line and words[1] in line]
+        assert found, done.err
     assert lag.records() == []
 
 

@@ -139,10 +139,11 @@ def _structure(version: int) -> str:
             ]
         )
     groups = {"Outputs": outputs, "Derivatives": derivatives}
-    return "".join(
-        f"<{group}>{''.join(f'<Unknown index={chr(34)}{indices[name]}{chr(34)}/>' for name in names)}</{group}>"
-        for group, names in groups.items()
-    )
+    text = ""
+    for group, names in groups.items():
+        unknowns = "".join(f'<Unknown index="{indices[name]}"/>' for name in names)
+        text += f"<{group}>{unknowns}</{group}>"
+    return text
 
 
 def build_ball_fmu(version: int, folder: Path, interface: str = "ME") -> Path:

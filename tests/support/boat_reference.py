@@ -163,7 +163,8 @@ def strip_points(vessel: SurfaceVessel) -> np.ndarray:
         np.sqrt(hull.longitudinal_moment / hull.area / 2),
         np.sqrt(hull.transverse_moment / hull.area),
     )
-    return np.array([(n * spacing, side * offset) for side in (1, -1) for n in (2, 1, 0, -1, -2)])
+    ahead, side = np.tile((2, 1, 0, -1, -2), 2), np.repeat((1, -1), 5)
+    return np.column_stack([ahead * spacing, side * offset])
 
 
 def buoyancy(

@@ -32,11 +32,10 @@ BOX_DRAUGHT, BOX_DEPTH, PROPELLER_DISC = MASS / DENSITY / AREA, BEAM, np.pi * 0.
 #: x, y of ten points with the area moments of the waterplane, y^2 = b^2 + B^2 / 12 and x^2 = C L^2
 #: / 12 in the mean
 STATION = np.sqrt(FULLNESS * LENGTH**2 / 12 / 2)
-POINTS = np.array(
+POINTS = np.column_stack(
     [
-        (n * STATION, side * np.sqrt(OFFSET**2 + BEAM**2 / 12))
-        for side in (1, -1)
-        for n in (2, 1, 0, -1, -2)
+        np.tile((2, 1, 0, -1, -2), 2) * STATION,
+        np.repeat((1, -1), 5) * np.sqrt(OFFSET**2 + BEAM**2 / 12),
     ]
 )
 MIDDLE = -FLOAT_HEIGHT - BOX_DRAUGHT + BOX_DEPTH / 2

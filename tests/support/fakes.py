@@ -49,9 +49,9 @@ class FakeComponent(Component):
     def _start(variable: Variable) -> Any:
         if variable.shape:
             return list(variable.start or [0.0] * len(variable.scalar_names))
-        return (
-            ("" if variable.type == "String" else 0) if variable.start is None else variable.start
-        )
+        if variable.start is not None:
+            return variable.start
+        return "" if variable.type == "String" else 0
 
     def set(self, name: str, value: Any) -> None:
         self.calls.append(f"set {name}")

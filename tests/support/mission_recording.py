@@ -54,12 +54,14 @@ def mission_result(offset=(0.03, 0.04), yaw=0.0, **columns):
         "plant.usv.deck.velocity.y": zero,
         "plant.usv.deck.velocity.z": zero,
         "uav.vtol.altitude_reference": np.minimum(height, CRUISE_HEIGHT) + 0.05,
-        "uav.vtol.mode": np.array(
-            [max(mode for start, mode in MODES if start <= t) for t in time], np.int32
-        ),
+        "uav.vtol.mode": np.array([_mode_at(t) for t in time], np.int32),
         **{f"uav.rotor_speed[{i}]": np.where(time < 12.3, 340.0 + i, 0.0) for i in range(1, 5)},
     }
     return with_signals(Result(Recording(time, signals, dict.fromkeys(signals, ""))), **columns)
+
+
+def _mode_at(time):
+    return max(mode for start, mode in MODES if start <= time)
 
 
 def with_signals(result, **columns):

@@ -40,7 +40,7 @@ SPACING = np.sqrt(p.LONGITUDINAL_MOMENT / AREA / 2)
 OFFSET = np.sqrt(p.TRANSVERSE_MOMENT / AREA)
 #: places of the strips ahead and to port of the centre of flotation, and the heights of their
 #: bottoms above O
-POINTS = np.array([(n * SPACING, side * OFFSET) for side in (1, -1) for n in (2, 1, 0, -1, -2)])
+POINTS = np.column_stack([np.tile((2, 1, 0, -1, -2), 2) * SPACING, np.repeat((1, -1), 5) * OFFSET])
 BOTTOMS = -np.tile(HULL_MASS / RHO / AREA * (1 + np.arange(2, -3, -1) * 0.4 / (2 * SPACING)), 2)
 DEPTHS, PLACES = TOP - BOTTOMS, POINTS + np.array([-0.2, 0.0])
 

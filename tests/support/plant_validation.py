@@ -104,10 +104,16 @@ def statement(
         model,
         what,
         unit,
-        f"{relative:g} rel." if relative else f"{within:g}" if within else "exact",
+        _tolerance_text(relative, within),
         source,
         test,
     )
+
+
+def _tolerance_text(relative: float, within: float) -> str:
+    if relative:
+        return f"{relative:g} rel."
+    return f"{within:g}" if within else "exact"
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 altitude and attitude.
 """
 
+from itertools import product
 from math import cos, hypot, sin
 
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Real
@@ -13,12 +14,7 @@ THRUST, TORQUE = (
 )  # N.s2 and N.m.s2: force and torque of a rotor by its speed squared
 DESCENT, CLIMB = 0.3, 0.6  # m/s
 REALS = [
-    *(
-        f"{owner}.{quantity}.{axis}"
-        for owner in ("vehicle", "target")
-        for quantity in ("position", "velocity")
-        for axis in "xyz"
-    ),
+    *map(".".join, product(("vehicle", "target"), ("position", "velocity"), "xyz")),
     *(f"vehicle.attitude.{angle}" for angle in ("roll", "pitch", "yaw")),
     *(f"vehicle.rates.{rate}" for rate in "pqr"),
     "altitude_command",

@@ -17,10 +17,10 @@ HULLS = -p.HULL_COUNT * np.array([[0, 0, 0], [0, p.Y_V, p.Y_R], [0, p.N_V, p.N_R
 
 
 def _common() -> dict[str, Any]:
-    boxes = [
-        {"size": [2 * half for half in box.half_extents], "position": list(box.position)}
-        for box in geometry.BODY.boxes
-    ]
+    boxes = []
+    for box in geometry.BODY.boxes:
+        size = [2 * half for half in box.half_extents]
+        boxes.append({"size": size, "position": list(box.position)})
     return {
         "mass": p.MASS,
         "water_density": p.WATER_DENSITY,

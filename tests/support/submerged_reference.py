@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
+from operator import attrgetter
 
 import numpy as np
 
@@ -34,12 +35,12 @@ def arrays(craft: Craft) -> tuple[np.ndarray, ...]:
     """Hubs, axes, loads of unit thrusts (6, n), coefficients of thrust (both senses) and of torque,
     and the rigid mass matrix.
     """
-    hubs, axes = (
-        np.array([getattr(thruster, name) for thruster in craft.thrusters])
-        for name in ("position", "axis")
+    hubs = np.array([thruster.position for thruster in craft.thrusters])
+    axes = np.array([thruster.axis for thruster in craft.thrusters])
+    coefficients = attrgetter(
+        "thrust_coefficient", "reverse_thrust_coefficient", "torque_coefficient"
     )
-    names = ("thrust_coefficient", "reverse_thrust_coefficient", "torque_coefficient")
-    gains = np.array([[getattr(thruster, name) for thruster in craft.thrusters] for name in names])
+    gains = np.array(list(map(coefficients, craft.thrusters))).T
     rigid = np.diag([craft.mass] * 3 + [0.0] * 3)
     rigid[3:, 3:] = craft.inertia
     return hubs, axes, np.hstack([axes, np.cross(hubs, axes)]).T, gains, rigid

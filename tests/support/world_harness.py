@@ -63,13 +63,8 @@ class WorldHarness:
 
 def _ports(world: World, causality: str) -> Ports:
     variables = [variable for variable in world.variables if variable.causality == causality]
-    return Ports(
-        variables,
-        {
-            dtype: np.zeros(_size(variables, dtype), dtype)
-            for dtype in {v.dtype: None for v in variables}
-        },
-    )
+    dtypes = dict.fromkeys(variable.dtype for variable in variables)
+    return Ports(variables, {dtype: np.zeros(_size(variables, dtype), dtype) for dtype in dtypes})
 
 
 def _size(variables: list[Variable], dtype: Any) -> int:

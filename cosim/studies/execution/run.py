@@ -135,10 +135,7 @@ def _run_job(context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[str
             raise outcome.failure
         result, functions = Result(outcome.recording, metadata=prepared.origin), prepared.kpis()
         kpis = evaluate_kpis(result, functions)
-        _write_reply(
-            reply, {"kpis": kpis, "units": _known_units(kpi_units(functions, kpis, result.units))}
-        )
-        _results_written()
+        _write_results(reply, kpis, kpi_units(functions, kpis, result.units))
 
 
 def _run_with_replay(
@@ -157,14 +154,7 @@ def _run_with_replay(
         )
         if result.failure:
             raise result.failure
-        _write_reply(
-            reply, {"kpis": result.kpis, "units": _known_units(result.metadata["kpi_units"])}
-        )
-        _results_written()
-
-
-def _known_units(units: Mapping[str, str]) -> dict[str, str]:
-    return {name: unit for name, unit in units.items() if unit}
+        _write_results(reply, result.kpis, result.metadata["kpi_units"])
 
 
 def _set_deadline(context: StudyContext) -> None:
@@ -180,11 +170,10 @@ def _prepare_job(context: StudyContext, job: Job, fmu_files: FmuFiles) -> Prepar
     )
 
 
-def _results_written() -> None:
-    """Record in the journal that all results are written.
-
-    Later failures of components no longer count.
-    """
+def _write_results(reply: IO[str], kpis: Mapping[str, Any], units: Mapping[str, str]) -> None:
+    """Write the results and record that in the journal: later failures no longer count."""
+    known_units = {name: unit for name, unit in units.items() if unit}
+    _write_reply(reply, {"kpis": kpis, "units": known_units})
     signal.setitimer(signal.ITIMER_REAL, 0)
     if journal := current_journal():
         journal[EXIT_CODE] = 0

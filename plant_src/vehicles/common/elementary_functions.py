@@ -96,8 +96,8 @@ def logarithm(x: ca.SX) -> ca.SX:
 def _polynomial(coefficients: Sequence[float], x: ca.SX) -> ca.SX:
     """Evaluate a polynomial, lowest power first, by Estrin's scheme.
 
-    It adds pairs of terms and squares x, so that its operations can run in parallel; Horner's
-    scheme is one chain (Muller, "Elementary Functions", 3rd edition, section 5.3).
+    It adds pairs of terms and squares x, so that its operations can run in parallel, while those of
+    Horner's scheme are one chain (Estrin, "Organization of Computer Systems", 1960).
     """
     terms = [ca.SX(coefficient) for coefficient in coefficients]
     while len(terms) > 1:

@@ -7,10 +7,15 @@ the nose, positive yaw is counter-clockwise from above.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
 
 from cosim.core.component import Causality, Variability, Variable
 from cosim.core.units import parse_unit
+
+from .shapes import INERTIA_INDICES
 
 #: status codes of a predicted step, which the compiled equations report before anything has moved:
 #: valid; the vehicle leaves the box in which it cannot meet anything; an input or the state is not
@@ -60,12 +65,13 @@ def scalar_variable(
 def parameter(
     name: str,
     unit: str,
-    start: float,
+    start: Any,
     description: str,
     minimum: float | None = None,
     maximum: float | None = None,
+    shape: tuple[int, ...] = (),
 ) -> Variable:
-    """Return a real scalar parameter with a range."""
+    """Return a real parameter with a range: a scalar, or an array with a shape."""
     return Variable(
         name,
         "Float64",
@@ -73,11 +79,73 @@ def parameter(
         "fixed",
         start,
         parse_unit(unit),
-        (),
+        shape,
         description,
         minimum,
         maximum,
     )
+
+
+def vector_parameters(
+    name: str,
+    unit: str,
+    values: Sequence[float],
+    description: str,
+    minimum: float | None = None,
+) -> Iterator[Variable]:
+    """Yield a parameter for each component of a vector along x, y and z of the body."""
+    for axis, value in zip("xyz", values, strict=False):
+        text = f"{description}: {axis}, body frame"
+        yield parameter(f"{name}.{axis}", unit, float(value), text, minimum)
+
+
+def matrix_parameter(name: str, description: str, matrix: np.ndarray) -> Variable:
+    """Return a parameter that is a matrix, in SI units."""
+    start = tuple(np.ravel(matrix).tolist())
+    return parameter(name, "1", start, f"{description}, SI units", shape=matrix.shape)
+
+
+def element_parameters(
+    kind: str, elements: Sequence[Any], columns: Iterable[tuple[str, str, str, str]], slots: int
+) -> Iterator[Variable]:
+    """Yield the arrays of the values of rotors, thrusters, propellers or rudders.
+
+    Args:
+        kind: Name of an element.
+        elements: Data of the elements.
+        columns: Attribute of an element, and name, unit and description of its parameter. The
+            attributes "position" and "axis" are vectors, with an array for each component.
+        slots: Number of elements of the arrays; those without data are 0.
+    """
+    empty = (0.0,) * (slots - len(elements))
+    for attribute, name, unit, text in columns:
+        values = [getattr(element, attribute) for element in elements]
+        if attribute in ("position", "axis"):
+            for k, axis in enumerate("xyz"):
+                start = (*(value[k] for value in values), *empty)
+                description = f"{kind}s: {text}: {axis}, body frame"
+                yield parameter(f"{name}.{axis}", unit, start, description, shape=(slots,))
+        else:
+            start = (*map(float, values), *empty)
+            yield parameter(name, unit, start, f"{kind}s: {text}", shape=(slots,))
+
+
+def element_commands(name: str, unit: str, description: str, slots: int) -> Variable:
+    """Return the input that commands an array of elements."""
+    return Variable(
+        name,
+        "Float64",
+        "input",
+        start=(0.0,) * slots,
+        unit=parse_unit(unit),
+        shape=(slots,),
+        description=description,
+    )
+
+
+def element_states(name: str, slots: int) -> tuple[str, ...]:
+    """Return the names of the states of an array of elements."""
+    return tuple(f"{name}[{number}]" for number in range(1, slots + 1))
 
 
 EULER_ANGLES = ("roll", "pitch", "yaw")
@@ -102,6 +170,11 @@ DECK_OUTPUTS = (
     ),
 )
 
+
+def _flag(name: str, description: str) -> Variable:
+    return Variable(name, "Boolean", "output", "discrete", description=description)
+
+
 #: outputs that only a world computes: contact and failures; a plant FMU publishes 0 and false
 WORLD_OUTPUTS = (
     Variable(
@@ -111,27 +184,22 @@ WORLD_OUTPUTS = (
         unit=parse_unit("N"),
         description="sum of normal forces, mean over the step",
     ),
-    Variable(
-        "contact.touching", "Boolean", "output", "discrete", description="contact with anything"
-    ),
-    Variable(
-        "contact.vessel", "Boolean", "output", "discrete", description="contact with a vessel"
-    ),
-    Variable(
-        "crashed",
-        "Boolean",
-        "output",
-        "discrete",
-        description="collision above the crash speed or capsize; stays true",
-    ),
-    Variable(
-        "ditched",
-        "Boolean",
-        "output",
-        "discrete",
-        description="centre of mass below the water; stays true",
-    ),
+    _flag("contact.touching", "contact with anything"),
+    _flag("contact.vessel", "contact with a vessel"),
+    _flag("crashed", "collision above the crash speed or capsize; stays true"),
+    _flag("ditched", "centre of mass below the water; stays true"),
 )
+
+
+def inertia_variables(mass: float, inertia: np.ndarray, mass_text: str) -> tuple[Variable, ...]:
+    """Return the parameters `mass` (kg) and `inertia.*` (kg m2, centre of mass, body frame)."""
+    text = "inertia tensor about the centre of mass, body frame, rotors locked"
+    tensor = (
+        scalar_variable(name, "kg.m2", f"{text}: {name[-2:]}", "parameter", float(inertia[place]))
+        for name, place in INERTIA_INDICES.items()
+    )
+    return (scalar_variable("mass", "kg", mass_text, "parameter", mass), *tensor)
+
 
 #: external loads at the centre of mass
 EXTERNAL_LOADS = (
@@ -187,11 +255,9 @@ SURFACE_COLUMNS = 9
 def _wave_parameter(
     name: str, unit: str, description: str, minimum: float | None = None
 ) -> Variable:
-    start = (0.0,) * MAX_WAVE_COMPONENTS
     shape = (MAX_WAVE_COMPONENTS,)
-    return Variable(
-        name, "Float64", "parameter", "fixed", start, parse_unit(unit), shape, description, minimum
-    )
+    start = (0.0,) * MAX_WAVE_COMPONENTS
+    return parameter(name, unit, start, description, minimum, shape=shape)
 
 
 #: wave components; those after the first `wave.count` are not used
@@ -214,6 +280,16 @@ FREE_STATES = (
     *(f"orientation.{axis}" for axis in "wxyz"),
     *(f"velocity.{axis}" for axis in "xyz"),
     *(f"rates.{axis}" for axis in "pqr"),
+)
+
+#: states of a vessel in the horizontal plane; actuator states follow them
+PLANAR_STATES = (
+    "position.x",
+    "position.y",
+    "attitude.yaw",
+    "velocity_body.u",
+    "velocity_body.v",
+    "rates.r",
 )
 
 #: states of a vessel in six degrees of freedom; actuator states follow them

@@ -62,17 +62,19 @@ def euler_angles(q: ca.SX) -> ca.SX:
 
 
 def euler_to_body_rates(roll: ca.SX, pitch: ca.SX) -> ca.SX:
-    """Return the matrix (3, 3) from the time derivatives of roll, pitch and yaw to the rates p, q, r in the body frame."""
+    """Return the matrix (3, 3) from the rates of roll, pitch and yaw to those of the body.
+
+    The latter are p, q, r in the body frame (Fossen 2021, Handbook of Marine Craft Hydrodynamics
+    and Motion Control, 2nd edition, section 2.2).
+    """
     cos, sin = ca.cos(roll), ca.sin(roll)
-    about_y, about_z = (
-        ca.vertcat(0, cos, -sin),
-        ca.vertcat(-ca.sin(pitch), sin * ca.cos(pitch), cos * ca.cos(pitch)),
-    )
+    about_y = ca.vertcat(0, cos, -sin)
+    about_z = ca.vertcat(-ca.sin(pitch), sin * ca.cos(pitch), cos * ca.cos(pitch))
     return ca.horzcat(ca.SX([1, 0, 0]), about_y, about_z)
 
 
 def body_to_euler_rates(roll: ca.SX, pitch: ca.SX) -> ca.SX:
-    """Return the inverse of `euler_to_body_rates`, shape (3, 3), singular at a pitch of 90 degrees."""
+    """Return the inverse of `euler_to_body_rates`, singular at a pitch of 90 degrees."""
     cos, sin, tan_pitch = ca.cos(roll), ca.sin(roll), ca.tan(pitch)
     about_y = ca.vertcat(sin * tan_pitch, cos, sin / ca.cos(pitch))
     about_z = ca.vertcat(cos * tan_pitch, -sin, cos / ca.cos(pitch))
@@ -80,7 +82,10 @@ def body_to_euler_rates(roll: ca.SX, pitch: ca.SX) -> ca.SX:
 
 
 def rotation_vector(q: ca.SX) -> ca.SX:
-    """Return the rotation vector (axis times angle, rad) with the smaller angle, by a series for tiny angles."""
+    """Return the rotation vector (axis times angle, rad) with the smaller angle.
+
+    By a series for tiny angles.
+    """
     shorter = ca.if_else(q[0] < 0, -1, 1) * q
     sine_squared = ca.dot(shorter[1:4], shorter[1:4])
     sine = ca.sqrt(sine_squared + 1e-300)
@@ -91,7 +96,10 @@ def rotation_vector(q: ca.SX) -> ca.SX:
 
 
 def quaternion_from_rotation_vector(vector: ca.SX) -> ca.SX:
-    """Return the quaternion of a rotation vector (axis times angle, rad), by a series for tiny angles."""
+    """Return the quaternion of a rotation vector (axis times angle, rad).
+
+    By a series for tiny angles.
+    """
     angle_squared = ca.dot(vector, vector)
     angle = ca.sqrt(angle_squared + 1e-300)
     factor = ca.if_else(

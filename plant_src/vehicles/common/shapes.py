@@ -1,9 +1,10 @@
-"""Rigid bodies for Bullet: mass, inertia and collision shapes."""
+"""Rigid bodies for Bullet: mass, inertia, principal axes and collision shapes."""
 
 from __future__ import annotations
 
 import math
-from itertools import product
+from collections.abc import Callable, Iterator, Mapping
+from itertools import permutations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,22 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 BODY_UP: Vector = (0.0, 0.0, 1.0)
+
+#: largest number of points of a convex piece
+MAX_POINTS = 64
+
+#: relative rounding error of the elements of a matrix
+_TOLERANCE = 1e-9
+
+#: parameter -> row and column in the symmetric inertia tensor
+INERTIA_INDICES = {
+    "inertia.xx": (0, 0),
+    "inertia.yy": (1, 1),
+    "inertia.zz": (2, 2),
+    "inertia.xy": (0, 1),
+    "inertia.xz": (0, 2),
+    "inertia.yz": (1, 2),
+}
 
 
 class Box(NamedTuple):
@@ -80,7 +97,10 @@ class ConvexPiece(NamedTuple):
         return ConvexPiece(tuple(_sum(point, offset) for point in self.points))
 
     def shape_in(self, to_body: np.ndarray) -> ConvexPiece:
-        """Return the piece in the frame from which `to_body` (3, 3) rotates into that of the body."""
+        """Return the piece in another frame.
+
+        `to_body` (3, 3) rotates from this frame into that of the body.
+        """
         return ConvexPiece(tuple((x, y, z) for x, y, z in (self.corners() @ to_body).tolist()))
 
 
@@ -90,6 +110,10 @@ def _sum(a: Vector, b: Vector) -> Vector:
 
 #: part of a collision shape
 Shape = Box | ConvexPiece
+
+#: function from the rotation matrix (3, 3) principal axes to body frame to the collision shape in
+#: principal axes
+Boxes = Callable[[np.ndarray], tuple[Shape, ...]]
 
 
 class Body(NamedTuple):
@@ -133,14 +157,13 @@ def level_box(to_body: np.ndarray, size: Vector, position: Vector, yaw: float = 
 
 
 def quaternion_from_matrix(rotation: np.ndarray) -> Quaternion:
-    """Return the unit quaternion (x, y, z, w) of a rotation matrix (3, 3) with an angle well below 180 degrees."""
+    """Return the unit quaternion (x, y, z, w) of a rotation matrix (3, 3).
+
+    Its angle must be well below 180 degrees, because w is the divisor.
+    """
     w = math.sqrt(1 + np.trace(rotation)) / 2
     x, y, z = (rotation[k - 1, k - 2] - rotation[k - 2, k - 1] for k in range(3))
     return float(x / (4 * w)), float(y / (4 * w)), float(z / (4 * w)), w
-
-
-#: largest number of points of a convex piece
-MAX_POINTS = 64
 
 
 def outermost_points(points: np.ndarray) -> np.ndarray:
@@ -155,3 +178,99 @@ def outermost_points(points: np.ndarray) -> np.ndarray:
     directions = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
     chosen: np.ndarray = points[np.unique(np.argmax(points @ directions.T, axis=0))]
     return chosen
+
+
+def inertia_of(parameters: Mapping[str, float]) -> np.ndarray:
+    """Return the inertia tensor (kg m2) of the parameters `inertia.*`, shape (3, 3)."""
+    inertia = np.zeros((3, 3))
+    for name, (i, j) in INERTIA_INDICES.items():
+        inertia[i, j] = inertia[j, i] = parameters[name]
+    return inertia
+
+
+def inertia_problems(inertia: np.ndarray) -> Iterator[str]:
+    """Yield a message if no rigid body has this inertia tensor (kg m2)."""
+    tensor = np.asarray(inertia, float)
+    if tensor.shape != (3, 3) or not np.isfinite(tensor).all():
+        yield f"found {tensor.tolist()}, expected 3 rows of 3 finite numbers"
+    elif not np.allclose(tensor, tensor.T, rtol=1e-12, atol=0):
+        yield f"found {tensor.tolist()}, expected a symmetric tensor"
+    else:
+        moments, axes = np.linalg.eigh(tensor)  # in ascending order
+        small, middle, large = moments.tolist()
+        if small <= 0:
+            yield (
+                f"found the principal moments {_moments_text(moments, axes)}, expected all greater "
+                "than 0"
+            )
+        elif large > (small + middle) * (1 + 1e-9):
+            text = _moments_text(moments, axes)
+            yield (
+                f"found the principal moments {text}, expected none greater than the sum of the "
+                "other two"
+            )
+
+
+def symmetry_problems(matrix: np.ndarray) -> Iterator[str]:
+    """Yield a message if a matrix is not symmetric."""
+    if not np.allclose(matrix, matrix.T, rtol=_TOLERANCE, atol=0):
+        yield "expected a symmetric matrix"
+
+
+def eigenvalue_problems(matrix: np.ndarray) -> Iterator[str]:
+    """Yield a message if the symmetric part of a matrix is not positive semi-definite.
+
+    The kinetic energy of added mass and the power that damping takes away would be negative for
+    some motion.
+    """
+    lowest = float(np.linalg.eigvalsh((matrix + matrix.T) / 2)[0])
+    if lowest < -_TOLERANCE * np.abs(matrix).max():
+        yield f"found the eigenvalue {lowest:g}, expected none below 0"
+
+
+def _moments_text(moments: np.ndarray, axes: np.ndarray) -> str:
+    """Return principal moments with their axes in words, in the order of the nearest body axes."""
+    nearest = np.argmax(np.abs(axes), axis=0)
+    texts = []
+    for k in np.argsort(nearest, kind="stable"):
+        axis, largest = axes[:, k], axes[nearest[k], k]
+        components = ", ".join(f"{round(x / np.sign(largest), 2) + 0.0:g}" for x in axis)
+        name = "xyz"[nearest[k]] if abs(largest) > 1 - 1e-9 else f"[{components}]"
+        texts.append(f"{moments[k]:.4g} about {name}")
+    return ", ".join(texts)
+
+
+def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the principal moments of inertia and their axes.
+
+    Args:
+        inertia: Inertia tensor (kg m2, body frame), shape (3, 3).
+
+    Returns:
+        Moments of inertia (kg m2), shape (3,), and the rotation matrix from the principal axes to
+        the body frame, shape (3, 3). Its angle is less than 120 degrees; subject to that, the
+        moments ascend.
+    """
+    moments, axes = np.linalg.eigh(inertia)
+    for order in permutations(range(3)):
+        ordered = axes[:, order] * np.where(np.diag(axes[:, order]) < 0, -1.0, 1.0)
+        for signs in product((1.0, -1.0), repeat=3):
+            to_body = ordered * signs[::-1]
+            if np.linalg.det(to_body) > 0 and np.trace(to_body) > 0:
+                return moments[list(order)], to_body
+    raise AssertionError(
+        "one of the 24 frames of the principal axes is rotated by less than 63 degrees"
+    )
+
+
+def principal_body(mass: float, inertia: np.ndarray, boxes: Boxes) -> Body:
+    """Return a rigid body for Bullet, in its principal axes.
+
+    Args:
+        mass: Mass (kg).
+        inertia: Inertia tensor about the centre of mass (kg m2, body frame), shape (3, 3).
+        boxes: Collision shape.
+    """
+    moments, to_body = principal_axes(inertia)
+    x, y, z = moments.tolist()
+    return Body(mass, (x, y, z), boxes(to_body), axes=quaternion_from_matrix(to_body))

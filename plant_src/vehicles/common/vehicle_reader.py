@@ -21,8 +21,7 @@ from cosim.core.errors import InputError, abbreviate_names
 from cosim.core.units import KNOWN_UNITS, PREFIXED, Unit, parse_unit
 
 from ...json_reader import JsonPath, JsonReader, Numbers
-from .inertia import Boxes
-from .shapes import BODY_UP, Body, ConvexPiece, Shape, Vector, level_box
+from .shapes import BODY_UP, Body, Boxes, ConvexPiece, Shape, Vector, level_box
 
 #: keys that every object of vehicle data may have; they are texts for the reader of the file
 TEXT_KEYS = ("source", "note")

@@ -1,5 +1,6 @@
-"""Elevation of the water surface in irregular waves, as a CasADi function that vehicles' binaries call in C.
+"""Elevation of the water surface in irregular waves.
 
+It is a CasADi function that the binaries of vehicles call in C.
 The elevation is the sum over components of a cos(k (x cos d + y sin d) - w t + phase).
 """
 
@@ -33,12 +34,9 @@ SURFACE_SUM = sum_over_rows("surface", _elevation_term(), MAX_WAVE_COMPONENTS)
 
 
 def create_elevation_function() -> ca.Function:
-    """Return the function from (x, y, time), number and table of components to the elevation (m)."""
-    place, count, rows = (
-        ca.SX.sym("place", 3),
-        ca.SX.sym("count"),
-        ca.SX.sym("rows", MAX_WAVE_COMPONENTS, WAVE_COLUMNS),
-    )
+    """Return the function from (x, y, time), number and table of components to the elevation."""
+    place, count = ca.SX.sym("place", 3), ca.SX.sym("count")
+    rows = ca.SX.sym("rows", MAX_WAVE_COMPONENTS, WAVE_COLUMNS)
     return ca.Function(
         "water_elevation",
         [place, count, ca.vec(rows)],

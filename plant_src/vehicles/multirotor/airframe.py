@@ -15,8 +15,7 @@ import numpy as np
 from cosim.core.errors import InputError, Problem
 
 from ...json_reader import JsonPath
-from ..common.inertia import Boxes, inertia_problems, principal_body
-from ..common.shapes import BODY_UP, Body, Vector
+from ..common.shapes import BODY_UP, Body, Boxes, Vector, inertia_problems, principal_body
 from ..common.vehicle_reader import TORQUE_SIGNS, Collision, VehicleReader, edges_around
 
 #: largest number of rotors
@@ -42,6 +41,11 @@ class Rotor:
     thrust_coefficient: float
     torque_coefficient: float
     axis: Vector = BODY_UP
+
+    @property
+    def signed_torque_coefficient(self) -> float:
+        """Reaction torque about the axis over squared speed, with its sign (N m s2/rad2)."""
+        return self.torque_sign * self.torque_coefficient
 
 
 @dataclass(frozen=True)

@@ -308,6 +308,7 @@ def free_step(equations: MultirotorEquations) -> Callee:
     return Callee(either, body, [plain, full, wet])
 
 
+#: a backslash continues a line of this source without a new line in the C code;
 #: the lowest point is not above the bottom of the hull or a quarter turn of the rotors' discs below
 #: their hubs
 _FREE_STEP_C = """{
@@ -317,14 +318,17 @@ _FREE_STEP_C = """{
     if (effects) step_with_effects(in, out);
     else plain_step(in, out);
     for (int i = 0; i < 2; ++i) {
-        const double *const x = ends[i], up = 1 - 2 * (x[4] * x[4] + x[5] * x[5]), tilt = up * up < 1 ? sqrt(1 - up * up) : 0;
-        const double rotors = tilt * constants[%(reach)d] + constants[%(reach)d + 1] + constants[%(radius)d] / 2;
+        const double *const x = ends[i], up = 1 - 2 * (x[4] * x[4] + x[5] * x[5]), \
+tilt = up * up < 1 ? sqrt(1 - up * up) : 0;
+        const double rotors = tilt * constants[%(reach)d] + constants[%(reach)d + 1] \
++ constants[%(radius)d] / 2;
         const double hull = constants[%(height)d] / 2;
         wet |= x[2] - (rotors > hull ? rotors : hull) < in[1][%(level)d];
     }
     if (!wet) return;
     double state[%(states)d];
-    const double part = in[3][0] / %(sub_steps)d, *const arguments[4] = {state, in[1], constants, &part};
+    const double part = in[3][0] / %(sub_steps)d, *const \
+arguments[4] = {state, in[1], constants, &part};
     for (int i = 0; i < %(states)d; ++i) state[i] = in[0][i];
     for (int k = 0; k < %(sub_steps)d; ++k) {
         step_in_water(arguments, out);

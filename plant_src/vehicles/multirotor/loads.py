@@ -255,7 +255,8 @@ _REDUCTIONS_C = """{
     for (int i = 0; i < %(slots)d; ++i) out[0][i] = 0;
     for (int i = 0; i < count; ++i)
         for (int j = 0; j < count; ++j) {
-            const double x = in[1][i] - in[1][j], y = in[2][i] - in[2][j], d2 = x * x + y * y + 4 * z * z;
+            const double x = in[1][i] - in[1][j], y = in[2][i] - in[2][j], \
+d2 = x * x + y * y + 4 * z * z;
             out[0][i] += radius * radius / 2 * z / (d2 * sqrt(d2));
         }
 }

@@ -1,9 +1,12 @@
-"""Surface below a multirotor and height of the water at it, computed in each step of a world by the multirotor's binary.
+"""Surface below a multirotor and height of the water at it.
 
-The surface is the highest deck, platform or water vertically below the centre of the rotors. An edge at the distance d from the
-centre leaves the share 1/2 + (c sqrt(1 - c^2) + asin c) / pi of a disc of the radius R, with c = d / R limited to -1 ... 1. The
-share of a strip is the sum of those of its edges minus 1. The share of a rectangle is the product of those of its two strips,
-which is exact beside one edge.
+The multirotor's binary computes them in each step of a world.
+
+The surface is the highest deck, platform or water vertically below the centre of the rotors. An
+edge at the distance d from the centre leaves the share 1/2 + (c sqrt(1 - c^2) + asin c) / pi of a
+disc of the radius R, with c = d / R limited to -1 ... 1: the area of a segment of a circle. The
+share of a strip is the sum of those of its edges minus 1. The share of a rectangle is the product
+of those of its two strips, which is exact beside one edge.
 """
 
 from __future__ import annotations
@@ -57,11 +60,8 @@ def create_surroundings_function() -> tuple[ca.Function, Callee]:
     arguments = pose, disc, sea, waves, count, row = [
         ca.SX.sym(name, size) for name, size in sizes.items()
     ]
-    elevation, point, surface = (
-        create_elevation_function(),
-        _disc_centre_function(),
-        _surface_function(),
-    )
+    elevation, point = create_elevation_function(), _disc_centre_function()
+    surface = _surface_function()
     centre = point(pose, disc)
     height, share = ca.vertsplit(surface(centre, disc[3], row))
     hidden = ca.logic_and(ca.logic_and(count > 0, share > 0), height <= centre[2])
@@ -92,15 +92,13 @@ def _disc_centre_function() -> ca.Function:
 
 
 def _surface_function() -> ca.Function:
-    """Return the function from a point (m), a radius (m) and a row of the table to the height (m) of the plane and its share.
+    """Return the function of a surface below a disc.
 
-    The share is 0 if the rectangle is beside the disc or upside down.
+    Its arguments are a point (m), a radius (m) and a row of the table, its results the height (m)
+    of the plane and its share. The share is 0 if the rectangle is beside the disc or upside down.
     """
-    point, radius, row = (
-        ca.SX.sym("point", 3),
-        ca.SX.sym("radius"),
-        ca.SX.sym("row", SURFACE_COLUMNS),
-    )
+    point, radius = ca.SX.sym("point", 3), ca.SX.sym("radius")
+    row = ca.SX.sym("row", SURFACE_COLUMNS)
     rotation, offset = kinematics.rotation_matrix(row[5:9]), point[0:2] - row[2:4]
     normal = rotation[:, 2]
     upright = normal[2] > 0
@@ -122,7 +120,7 @@ def _share_of_strip(half_width: ca.SX, position: ca.SX, radius: ca.SX) -> ca.SX:
 
 
 def _share_of_half_plane(ratio: ca.SX) -> ca.SX:
-    """Return the share of a disc whose centre is at `ratio` radii inside the edge of a half-plane."""
+    """Return the share of a disc whose centre is `ratio` radii inside the edge of a half-plane."""
     root = ca.sqrt(ca.fmax(1 - ratio * ratio, 0))
     at_the_edge = 0.5 + (ratio * root + arctangent(ratio, root)) / math.pi
     return ca.if_else(ca.fabs(ratio) < 1, at_the_edge, ratio > 0)
@@ -153,7 +151,8 @@ _SURROUNDINGS_C = """{
     out[0][2] = -highest_water;
     if (pose[2] - disc[4] < highest_water) {
         const double place[] = {pose[0], pose[1], sea[0]};
-        water_elevation((const double *const[]){place, sea + 2, waves}, (double *const[]){out[0] + 2});
+        water_elevation((const double *const[]){place, sea + 2, waves}, \
+(double *const[]){out[0] + 2});
         out[0][2] *= gain;
     }
 }

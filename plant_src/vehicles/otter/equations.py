@@ -1,4 +1,8 @@
-"""Equations of motion of the Otter in six degrees of freedom."""
+"""Equations of motion of the Otter in six degrees of freedom.
+
+The pontoons are strips whose bottoms rise from bow to stern. README.md has the loads,
+`vehicles/README.md` the rest.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +21,7 @@ from ..vessel.hull import (
     Hull,
     LoadArguments,
     attitude_at,
+    hull_of,
     improved_equilibrium,
     rigid_body_mass_matrix,
     upward_axis,
@@ -36,13 +41,18 @@ from .loads import (
     propulsion,
     wind,
 )
-from .parameters import BODY
 
 STRIPS = equivalent_strips(
     ca.SX(p.CENTRE_OF_FLOTATION),
     (ca.SX(p.TRANSVERSE_MOMENT), ca.SX(p.LONGITUDINAL_MOMENT)),
     ca.SX(p.WATERPLANE_AREA),
 )
+
+#: steps of the iteration for the equilibrium
+_EQUILIBRIUM_STEPS = 40
+
+_WEIGHT_DENSITY = p.WATER_DENSITY * p.GRAVITY  # N/m3
+_MOMENTS = ca.SX([p.TRANSVERSE_MOMENT, p.LONGITUDINAL_MOMENT])
 
 #: smallest draught at rest of a station (m), for payloads that lift it out of the water
 _MIN_DRAUGHT = 1e-3
@@ -60,11 +70,10 @@ def resting_pontoons(draughts: ca.SX, mean_draught: ca.SX) -> TwinHull:
     """
     positive = ca.fmax(draughts, _MIN_DRAUGHT)
     weights = STATION_COUNT / ca.sum1(positive) * positive
+    stations = zip(_DEPTHS, ca.vertsplit(positive), ca.vertsplit(weights), strict=True)
     boxes = [
         Box(ca.SX(depth), ca.SX(p.PONTOON_TOP - depth / 2), draught, depth / _MEAN_DEPTH, weight)
-        for depth, draught, weight in zip(
-            _DEPTHS, ca.vertsplit(positive), ca.vertsplit(weights), strict=True
-        )
+        for depth, draught, weight in stations
     ]
     return TwinHull(
         STRIPS,
@@ -79,29 +88,18 @@ def resting_pontoons(draughts: ca.SX, mean_draught: ca.SX) -> TwinHull:
 def station_draughts(equilibrium: ca.SX) -> ca.SX:
     """Return the draughts of the stations (m) for height of O (m), roll and pitch (rad) at rest."""
     up = upward_axis(equilibrium)
-    bottoms = zip(STRIPS.stations, p.STATION_DRAUGHTS, strict=True)
-    return ca.vertcat(
-        *(
-            up[2] * draught - equilibrium[0] - up[0] * (STRIPS.centre[0] + x)
-            for x, draught in bottoms
-        )
-    )
-
-
-#: steps of the iteration for the equilibrium
-_EQUILIBRIUM_STEPS = 40
-
-_WEIGHT_DENSITY = p.WATER_DENSITY * p.GRAVITY  # N/m3
-_MOMENTS = ca.SX([p.TRANSVERSE_MOMENT, p.LONGITUDINAL_MOMENT])
+    draughts = [
+        up[2] * draught - equilibrium[0] - up[0] * (STRIPS.centre[0] + x)
+        for x, draught in zip(STRIPS.stations, p.STATION_DRAUGHTS, strict=True)
+    ]
+    return ca.vertcat(*draughts)
 
 
 def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     """Return the constants of the equations."""
     own = mass_properties(parameters)
-    ballast, volume = (
-        Ballast(own.mass, own.centre, ca.SX(p.WATER_DENSITY)),
-        own.mass / p.WATER_DENSITY,
-    )
+    ballast = Ballast(own.mass, own.centre, ca.SX(p.WATER_DENSITY))
+    volume = own.mass / p.WATER_DENSITY
     equilibrium = _equilibrium(ballast)
     to_level = attitude_at(equilibrium)
     centre, inertia = to_level @ own.centre, to_level @ own.inertia @ to_level.T
@@ -136,7 +134,10 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
 
 
 def _equilibrium(ballast: Ballast) -> ca.SX:
-    """Return height of O (m), roll and pitch (rad) at rest, by Newton's method with the stiffness of the level hull."""
+    """Return height of O (m), roll and pitch (rad) at rest.
+
+    By Newton's method with the constant stiffness of the level hull.
+    """
     state, mass, centre = ca.SX.sym("state", 3), ca.SX.sym("mass"), ca.SX.sym("centre", 3)
     given = Ballast(mass, centre, ballast.water_density)
     lever = mass / p.WATER_DENSITY * (p.HULL_CENTRE_OF_BUOYANCY[2] - centre[2])
@@ -175,18 +176,13 @@ def frame(to_level: ca.SX, orientation: ca.SX) -> Frame:
 def hull(constants: NamedValues) -> Hull:
     """Return the vessel with these constants."""
     added = ca.diag(constants["added_mass"])
-    return Hull(
-        mass=constants["mass"],
-        centre_of_mass=constants["centre_of_mass"],
+    return hull_of(
+        constants,
         inertia=constants["inertia"],
         added_mass=added,
         coriolis_added_mass=added,
-        inverse_mass_matrix=constants["inverse_mass_matrix"],
         deck_centre=ca.SX(p.DECK_CENTRE),
-        equilibrium=constants["equilibrium"],
         strips=STRIPS,
-        wave_count=constants["wave.count"],
-        wave_table=constants["wave_table"],
         loads=lambda now: water_loads(constants, now) + propulsion(constants, now) + wind(now),
         frame=partial(frame, constants["to_level"]),
         centre_in_velocity_axes=constants["centre_in_level_axes"],
@@ -198,10 +194,8 @@ def water_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
 
     That of the moving water shrinks as the pontoons leave it.
     """
-    pontoons, up = (
-        resting_pontoons(constants["station_draughts"], constants["mean_draught"]),
-        now.frame.attitude[2, :].T,
-    )
+    pontoons = resting_pontoons(constants["station_draughts"], constants["mean_draught"])
+    up = now.frame.attitude[2, :].T
     under_water = immersion(pontoons, up, now.height, now.water.elevations)
     ballast = Ballast(constants["mass"], constants["centre_of_mass"], ca.SX(p.WATER_DENSITY))
     static = weight_and_buoyancy(under_water, up, ballast)
@@ -224,4 +218,4 @@ VESSEL = VesselModel(
 
 def block() -> Block:
     """Return the Otter for export."""
-    return floating_block(otter_model(VESSEL), VESSEL, constant_body(BODY))
+    return floating_block(otter_model(VESSEL), VESSEL, constant_body(p.BODY))

@@ -37,11 +37,8 @@ class MassProperties:
 
 def mass_properties(parameters: NamedValues) -> MassProperties:
     """Return the mass of the hull with the payload of these parameters."""
-    payload, position, hull_centre = (
-        parameters["payload_mass"],
-        parameters["payload_position"],
-        ca.SX(p.HULL_CENTRE),
-    )
+    payload, position = parameters["payload_mass"], parameters["payload_position"]
+    hull_centre = ca.SX(p.HULL_CENTRE)
     mass = p.HULL_MASS + payload
     centre = (p.HULL_MASS * hull_centre + payload * position) / mass
     inertia = p.HULL_MASS * ca.diag(ca.SX(p.RADII_OF_GYRATION) ** 2)
@@ -58,7 +55,15 @@ def added_mass(inertia: ca.SX) -> ca.SX:
 
 
 def linear_damping(mass: ca.SX, stiffness: ca.SX) -> ca.SX:
-    """Return the diagonal of the linear damping D, shape (6,), from the diagonal of M and the stiffness in heave, roll, pitch."""
+    """Return the diagonal of the linear damping D, shape (6,).
+
+    Surge balances the largest thrust at the largest speed, sway and yaw have time constants, heave,
+    roll and pitch damping ratios, as in MSS.
+
+    Args:
+        mass: Diagonal of M, shape (6,).
+        stiffness: Stiffness in heave, roll and pitch, shape (3,).
+    """
     frequencies = ca.sqrt(stiffness / mass[2:5])
     oscillating = 2 * ca.SX(p.DAMPING_RATIOS) * frequencies * mass[2:5]
     sway, yaw = p.DAMPING_TIME_CONSTANTS
@@ -66,7 +71,10 @@ def linear_damping(mass: ca.SX, stiffness: ca.SX) -> ca.SX:
 
 
 def cross_flow_drag(draught: ca.SX) -> ca.SX:
-    """Return the cross-flow drag of one station over its squared velocity (N s2/m2) for a draught (m)."""
+    """Return the cross-flow drag of one station over its squared velocity (N s2/m2).
+
+    The coefficient of a section follows Hoerner's curve over beam / (2 draught).
+    """
     slenderness, coefficients = zip(*p.CROSS_FLOW_DRAG_CURVE, strict=True)
     inside = ca.fmin(ca.fmax(p.PONTOON_BEAM / (2 * draught), slenderness[0]), slenderness[-1])
     coefficient = ca.pw_lin(inside, ca.DM(slenderness), ca.DM(coefficients))
@@ -74,7 +82,12 @@ def cross_flow_drag(draught: ca.SX) -> ca.SX:
 
 
 def damping(constants: NamedValues, now: LoadArguments) -> ca.SX:
-    """Return tau of the linear damping, which grows with the yaw rate in yaw, and of the cross-flow drag along the hull."""
+    """Return tau of the linear damping and of the cross-flow drag along the hull.
+
+    The linear damping in yaw grows with the yaw rate. The cross-flow drag is the sum over stations
+    of sections in transverse flow (Fossen 2021, section 6.4; Faltinsen 1990, Sea Loads on Ships and
+    Offshore Structures, chapter 6).
+    """
     growth = ca.vertcat(ca.SX.ones(5), 1 + p.YAW_DAMPING_GROWTH * ca.fabs(now.relative_velocity[5]))
     relative = ca.vertcat(now.relative_velocity[0:3], now.rates_in_water, now.relative_velocity[5])
     load = -constants["damping"] * growth * relative
@@ -97,13 +110,12 @@ def propulsion(constants: NamedValues, now: LoadArguments) -> ca.SX:
 
 
 def wind(now: LoadArguments) -> ca.SX:
-    """Return the load tau of the wind relative to still air, whose drag is part of the surge damping."""
-    coefficients = ca.SX(
-        [
-            p.AIR_DENSITY / 2 * a * c
-            for a, c in zip(p.PROJECTED_AREAS, p.WIND_COEFFICIENTS, strict=True)
-        ]
-    )
+    """Return the load tau of the wind relative to still air.
+
+    The drag of still air is part of the surge damping.
+    """
+    areas = zip(p.PROJECTED_AREAS, p.WIND_COEFFICIENTS, strict=True)
+    coefficients = ca.SX([p.AIR_DENSITY / 2 * area * drag for area, drag in areas])
     still, air = now.velocity[0:2], now.air_relative_velocity[0:2]
     force = coefficients * (ca.fabs(still) * still - ca.fabs(air) * air)
     return load_of_force_at(ca.SX([0, 0, p.WIND_HEIGHT]), ca.vertcat(force, 0))
@@ -111,7 +123,9 @@ def wind(now: LoadArguments) -> ca.SX:
 
 @dataclass(frozen=True, kw_only=True)
 class OtterModel(ContinuousModel):
-    """Model whose shaft speeds are constant during a step and follow their commands after it (Euler), as in MSS.
+    """Model whose shaft speeds are constant during a step, as in MSS.
+
+    After it they follow their commands by one Euler step.
 
     Attributes:
         vessel: Equations by name.
@@ -129,15 +143,11 @@ class OtterModel(ContinuousModel):
         del sub_steps  # always one, as in MSS
         end = super().integrate(state, inputs, parameters, step)
         first = len(VESSEL_STATES)
-        lag, shafts = (
-            self.vessel.constants.by_name(parameters)["propeller_time_constant"],
-            end[first:],
-        )
+        lag = self.vessel.constants.by_name(parameters)["propeller_time_constant"]
+        shafts = end[first:]
         commands = values_by_name(inputs, variables_of(VARIABLES, "input"))["propeller_speed"]
-        return ca.vertcat(
-            end[:first],
-            shafts + ca.fmin(1, ca.if_else(lag > 0, step / lag, 1)) * (commands - shafts),
-        )
+        share = ca.fmin(1, ca.if_else(lag > 0, step / lag, 1))
+        return ca.vertcat(end[:first], shafts + share * (commands - shafts))
 
 
 def otter_model(vessel: VesselModel) -> ContinuousModel:

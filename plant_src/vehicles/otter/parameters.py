@@ -1,4 +1,12 @@
-"""Parameters of the Otter with their sources, and its rigid body, in SI units."""
+"""Parameters of the Otter with their sources, and its rigid body, in SI units.
+
+Body frame: x forward, y left, z up, origin O midships on the centre line at the waterline.
+
+Source: the model `otter` of the Marine Systems Simulator (github.com/cybergalactic/MSS, MIT
+licence, revision of 2026-06-27) by T. I. Fossen; Fossen 2021, Handbook of Marine Craft
+Hydrodynamics and Motion Control, 2nd edition. The values are converted from the frame x forward, y
+right, z down: y and z of vectors change their sign. Values from elsewhere are marked [assumed].
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Equations of motion of the Otter exactly as in MSS."""
+"""Equations of motion of the Otter exactly as in MSS, with its linear hydrostatics.
+
+README.md has the loads, `vehicles/README.md` the rest.
+"""
 
 from __future__ import annotations
 
@@ -23,11 +26,24 @@ from ..otter.loads import (
     propulsion,
     wind,
 )
-from ..otter.parameters import BODY
-from ..vessel import hull as vessel
-from ..vessel.hull import Frame, Hull, LoadArguments, load_of_force_at, transformation_matrix
+from ..vessel.hull import (
+    Frame,
+    Hull,
+    LoadArguments,
+    hull_of,
+    load_of_force_at,
+    rigid_body_mass_matrix,
+    transformation_matrix,
+)
 from ..vessel.strips import TwinHull, equivalent_strips
 from ..vessel.vessel_equations import VesselModel, constant_body, floating_block, wave_table_of
+
+_CENTRE_OF_FLOTATION = ca.SX(p.CENTRE_OF_FLOTATION)
+_STRIPS = equivalent_strips(
+    _CENTRE_OF_FLOTATION,
+    (ca.SX(p.TRANSVERSE_MOMENT), ca.SX(p.MSS_LONGITUDINAL_MOMENT)),
+    ca.SX(p.WATERPLANE_AREA),
+)
 
 
 @dataclass(frozen=True)
@@ -63,19 +79,11 @@ def hydrostatics(mass: ca.SX, centre: ca.SX) -> Hydrostatics:
     return Hydrostatics(draught, stiffness, compliance, volume / p.WATERPLANE_AREA)
 
 
-_CENTRE_OF_FLOTATION = ca.SX(p.CENTRE_OF_FLOTATION)
-_STRIPS = equivalent_strips(
-    _CENTRE_OF_FLOTATION,
-    (ca.SX(p.TRANSVERSE_MOMENT), ca.SX(p.MSS_LONGITUDINAL_MOMENT)),
-    ca.SX(p.WATERPLANE_AREA),
-)
-
-
 def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     """Return the constants of the equations."""
     payload, own = parameters["payload_mass"], mass_properties(parameters)
     added = added_mass(own.inertia)
-    mass_matrix = vessel.rigid_body_mass_matrix(own.mass, own.centre, own.inertia) + ca.diag(added)
+    mass_matrix = rigid_body_mass_matrix(own.mass, own.centre, own.inertia) + ca.diag(added)
     floating = hydrostatics(own.mass, own.centre)
     constants = {
         **initial_parameters(parameters),
@@ -99,14 +107,20 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
 
 
 def trim(constants: Mapping[str, ca.SX], attitude: ca.SX) -> ca.SX:
-    """Return height of O (m), roll and pitch (rad) due to the payload for a rotation matrix body to world, shape (3,)."""
+    """Return height of O (m), roll and pitch (rad) due to the payload, shape (3,).
+
+    `attitude` is the rotation matrix body to world frame.
+    """
     force = attitude.T @ ca.vertcat(0, 0, constants["payload_force"])
     load = load_of_force_at(constants["payload_position"], force)
     return constants["compliance"] @ load[2:5]
 
 
 def _equilibrium(constants: Mapping[str, ca.SX]) -> ca.SX:
-    """Return the trim at rest by fixed-point iteration, which reduces the error to less than a tenth in each step."""
+    """Return the trim at rest by fixed-point iteration.
+
+    Each step reduces the error to less than a tenth.
+    """
     equilibrium = ca.SX.zeros(3)
     for _ in range(20):
         orientation = kinematics.quaternion_from_euler(equilibrium[1], equilibrium[2], ca.SX(0))
@@ -136,18 +150,13 @@ def frame(constants: NamedValues, orientation: ca.SX) -> Frame:
 def hull(constants: NamedValues) -> Hull:
     """Return the vessel with these constants."""
     added = ca.diag(constants["added_mass"])
-    return Hull(
-        mass=constants["mass"],
-        centre_of_mass=constants["centre_of_mass"],
+    return hull_of(
+        constants,
         inertia=constants["inertia"],
         added_mass=added,
         coriolis_added_mass=added,
-        inverse_mass_matrix=constants["inverse_mass_matrix"],
         deck_centre=ca.SX(p.DECK_CENTRE),
-        equilibrium=constants["equilibrium"],
         strips=_STRIPS,
-        wave_count=constants["wave.count"],
-        wave_table=constants["wave_table"],
         loads=lambda now: (
             propulsion(constants, now)
             + damping(constants, now)
@@ -171,7 +180,10 @@ def _twin_hull(draught: ca.SX) -> TwinHull:
 
 
 def restoring(constants: NamedValues, now: LoadArguments) -> ca.SX:
-    """Return the restoring load tau, linear in heave, roll and pitch relative to the trim and to the water surface."""
+    """Return the restoring load tau.
+
+    It is linear in heave, roll and pitch relative to the trim and to the water surface.
+    """
     angles = kinematics.euler_angles(now.orientation)[0:2]
     displacement = ca.vertcat(now.height, angles) - trim(constants, now.frame.attitude)
     to_flotation = transformation_matrix(_CENTRE_OF_FLOTATION)[2:5, 2:5]
@@ -192,4 +204,4 @@ VESSEL = VesselModel(
 
 def block() -> Block:
     """Return the Otter of MSS for export."""
-    return floating_block(otter_model(VESSEL), VESSEL, constant_body(BODY))
+    return floating_block(otter_model(VESSEL), VESSEL, constant_body(p.BODY))

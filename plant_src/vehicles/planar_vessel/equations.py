@@ -25,7 +25,6 @@ from cosim.export.equations.fmu_code import as_block
 from cosim.export.equations.model import ContinuousModel
 from cosim.export.fmu.block import Block
 
-from ..common import kinematics
 from ..common.elementary_functions import sine_and_cosine
 from ..common.interface import WORLD_OUTPUTS
 from ..common.named_values import (
@@ -197,14 +196,8 @@ def initial_state(constants: NamedValues, slots: int) -> ca.SX:
 def observe(state: ca.SX, constants: NamedValues) -> ca.SX:
     """Return the motion outputs of the vessel and of its landing deck."""
     centre = constants["centre_of_mass"]
-    position = ca.vertcat(state[0:2], constants["height"] + centre[2])
-    orientation = kinematics.quaternion_about_z(state[2])
-    to_world = kinematics.rotation_matrix(orientation)
-    rates = ca.vertcat(0, 0, state[5])
-    velocity = to_world @ ca.vertcat(state[3:5], 0)
-    to_deck = to_world @ (constants["deck_centre"] - centre)
-    deck = ca.vertcat(position + to_deck, velocity + ca.cross(rates, to_deck))
-    return ca.vertcat(kinematics.motion_outputs(position, orientation, velocity, rates), deck)
+    height, deck = constants["height"] + centre[2], constants["deck_centre"] - centre
+    return planar_maps.planar_outputs(state, height, deck)
 
 
 def planar_vessel_block(

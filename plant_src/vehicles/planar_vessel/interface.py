@@ -11,24 +11,19 @@ from ..common.interface import (
     DECK_OUTPUTS,
     EXTERNAL_LOADS,
     MOTION_OUTPUTS,
+    PLANAR_STATES,
     WIND_INPUTS,
     WORLD_OUTPUTS,
+    element_states,
     initial_variables,
+    matrix_parameter,
     parameter,
 )
 from ..vessel.actuators import actuator_inputs, actuator_parameters
-from ..vessel.boat import boat_parameters, matrix_parameter
+from ..vessel.boat import boat_parameters
 from .planar_vessel import PlanarVessel
 
 _INITIAL_PARAMETERS = initial_variables("xy", "uv", "r")
-_RIGID_BODY_STATES = (
-    "position.x",
-    "position.y",
-    "attitude.yaw",
-    "velocity_body.u",
-    "velocity_body.v",
-    "rates.r",
-)
 
 
 def variables(vessel: PlanarVessel, slots: tuple[int, int] | None = None) -> tuple[Variable, ...]:
@@ -67,22 +62,14 @@ def variables(vessel: PlanarVessel, slots: tuple[int, int] | None = None) -> tup
 
 
 def _damping_parameters(vessel: PlanarVessel) -> Iterator[Variable]:
-    for letter, matrix, value in zip(
-        "uvr", vessel.quadratic_damping, vessel.cubic_damping, strict=True
-    ):
-        yield matrix_parameter(
-            f"quadratic_damping.{letter}",
-            f"load over |{letter}| times velocity, for u, v, r",
-            matrix,
-        )
-        yield parameter(
-            f"cubic_damping.{letter}", "1", value, f"load over {letter} cubed, SI units", 0.0
-        )
+    dampings = zip("uvr", vessel.quadratic_damping, vessel.cubic_damping, strict=True)
+    for letter, matrix, value in dampings:
+        text = f"load over |{letter}| times velocity, for u, v, r"
+        yield matrix_parameter(f"quadratic_damping.{letter}", text, matrix)
+        text = f"load over {letter} cubed, SI units"
+        yield parameter(f"cubic_damping.{letter}", "1", value, text, 0.0)
 
 
 def states(propeller_slots: int) -> tuple[str, ...]:
     """Return the names of the states: those of a planar body, then the propeller speeds."""
-    return (
-        *_RIGID_BODY_STATES,
-        *(f"propeller_speed[{number}]" for number in range(1, propeller_slots + 1)),
-    )
+    return (*PLANAR_STATES, *element_states("propeller_speed", propeller_slots))

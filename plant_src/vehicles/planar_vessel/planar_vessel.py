@@ -11,8 +11,7 @@ import numpy as np
 
 from cosim.core.errors import Problem
 
-from ..common.inertia import Boxes
-from ..common.shapes import Body
+from ..common.shapes import Body, Boxes
 from ..vessel import boat as boat_data
 from ..vessel.boat import Boat, BoatReader
 

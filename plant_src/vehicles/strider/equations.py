@@ -1,4 +1,12 @@
-"""Equations of motion of the catamaran in the horizontal plane: surge, sway and yaw."""
+"""Equations of motion of the catamaran in the horizontal plane: surge, sway and yaw.
+
+They are eqs. 9, 12 and 13 of the paper (`parameters.py`); README.md has them in the project's
+notation. Loads (X, Y, N) are surge and sway force (N) and yaw moment (N m), body frame
+forward-left-up.
+
+The resistance is friction by the ITTC-57 line on the wetted surface (ITTC 1957, 8th conference,
+Madrid), and a residuary part that is a smooth curve over the Froude number (`parameters.py`).
+"""
 
 from __future__ import annotations
 
@@ -10,15 +18,13 @@ from cosim.export.equations.fmu_code import as_block
 from cosim.export.equations.model import ContinuousModel
 from cosim.export.fmu.block import Block
 
-from ..common import kinematics
 from ..common.elementary_functions import logarithm, sine_and_cosine
-from ..common.interface import WORLD_OUTPUTS
+from ..common.interface import PLANAR_STATES, WORLD_OUTPUTS
 from ..common.named_values import ConstantsMap, NamedValues, initial_parameters, values_by_name
 from ..vessel import planar_maps
 from ..vessel.propulsion import rudder_force
 from . import parameters as p
-from .interface import INPUTS, STATES, VARIABLES
-from .parameters import DECK_CENTRE
+from .interface import INPUTS, VARIABLES
 
 
 def resistance(u: ca.SX) -> ca.SX:
@@ -29,7 +35,10 @@ def resistance(u: ca.SX) -> ca.SX:
 
 
 def friction_coefficient(u: ca.SX) -> ca.SX:
-    """Return 0.075 / (log10 Re - 2)^2 for a speed (m/s), with the value at `MIN_REYNOLDS_NUMBER` for slower flow."""
+    """Return 0.075 / (log10 Re - 2)^2 for a speed (m/s), the ITTC-57 line.
+
+    Slower flow has the value at `MIN_REYNOLDS_NUMBER`.
+    """
     ratio = ca.fmax(1, ca.fabs(u) * (p.HULL_LENGTH / p.VISCOSITY / p.MIN_REYNOLDS_NUMBER))
     exponent = logarithm(ratio) * (1 / math.log(10)) + (math.log10(p.MIN_REYNOLDS_NUMBER) - 2)
     return 0.075 / (exponent * exponent)
@@ -45,17 +54,12 @@ def residuary_coefficient(square: ca.SX) -> ca.SX:
 
 
 def rate(state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
-    """Return the time derivative of the state (x, y, yaw, u, v, r).
-
-    U, v and r are surge, sway and yaw rate.
-    """
+    """Return the time derivative of the state (x, y, yaw, surge u, sway v, yaw rate r)."""
     yaw, u, v, r = ca.vertsplit(state[2:6])
     external_force, wind, current = inputs["external_force"], inputs["wind"], inputs["current"]
     sin, cos = sine_and_cosine(yaw)
-    u_water, v_water = (
-        u - (cos * current[0] + sin * current[1]),
-        v - (cos * current[1] - sin * current[0]),
-    )
+    u_water = u - (cos * current[0] + sin * current[1])
+    v_water = v - (cos * current[1] - sin * current[0])
     u_air, v_air = u - (cos * wind[0] + sin * wind[1]), v - (cos * wind[1] - sin * wind[0])
     race = race_velocity_squared(inputs["thrust"], constants["race_factor"])
     loads = (
@@ -73,7 +77,7 @@ def rate(state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
 
 
 def hull_loads(v: ca.SX, r: ca.SX) -> ca.SX:
-    """Return (X, Y, N) of the hulls for a sway velocity (m/s) and yaw rate (rad/s) relative to the water."""
+    """Return (X, Y, N) of the hulls for sway velocity and yaw rate relative to the water."""
     return p.HULL_COUNT * ca.vertcat(0, p.Y_V * v + p.Y_R * r, p.N_V * v + p.N_R * r)
 
 
@@ -91,15 +95,16 @@ def hull_constants(parameters: NamedValues) -> dict[str, ca.SX]:
 
 
 def race_factor(diameter: ca.SX) -> ca.SX:
-    """Return 2 / (rho A) (m2/s2/N) of a propeller with this diameter (m), and 0 for the diameter 0."""
+    """Return 2 / (rho A) (m2/s2/N) of a propeller with a diameter (m), 0 for the diameter 0."""
     area = math.pi / 4 * diameter * diameter
     return ca.if_else(area > 0, 2 / p.WATER_DENSITY / ca.fmax(area, 1e-9), 0)
 
 
 def race_velocity_squared(thrust: ca.SX, factor: ca.SX) -> ca.SX:
-    """Return what the propeller adds to the squared velocity at the rudder (m2/s2), in its fully developed race.
+    """Return what the propeller adds to the squared velocity at the rudder (m2/s2).
 
-    The momentum theory of the actuator disc gives u_race^2 = u^2 + 2 T / (rho A). Astern, the race leaves the rudder.
+    In its fully developed race, the momentum theory of the actuator disc gives u_race^2 = u^2 +
+    2 T / (rho A). Astern, the race leaves the rudder.
 
     Args:
         thrust: Thrust (N).
@@ -133,19 +138,12 @@ def initial_state(constants: ca.SX) -> ca.SX:
 
     The first constants are position, yaw angle, velocity and yaw rate in the order of the state.
     """
-    return constants[: len(STATES)]
+    return constants[: len(PLANAR_STATES)]
 
 
 def observe(state: ca.SX) -> ca.SX:
     """Return the motion outputs of the vessel and of its landing deck."""
-    position = ca.vertcat(state[0:2], p.CENTRE_OF_MASS_HEIGHT)
-    orientation = kinematics.quaternion_about_z(state[2])
-    to_world = kinematics.rotation_matrix(orientation)
-    rates = ca.vertcat(0, 0, state[5])
-    velocity = to_world @ ca.vertcat(state[3:5], 0)
-    to_deck = to_world @ ca.SX(DECK_CENTRE)
-    deck = ca.vertcat(position + to_deck, velocity + ca.cross(rates, to_deck))
-    return ca.vertcat(kinematics.motion_outputs(position, orientation, velocity, rates), deck)
+    return planar_maps.planar_outputs(state, ca.SX(p.CENTRE_OF_MASS_HEIGHT), ca.SX(p.DECK_CENTRE))
 
 
 #: map from the parameters to the constants of the equations
@@ -160,7 +158,7 @@ def model() -> ContinuousModel:
         "strider",
         "Strider V1.0 catamaran on calm water",
         VARIABLES,
-        STATES,
+        PLANAR_STATES,
         initial_state,
         lambda state, inputs, constants: rate(
             state, values_by_name(inputs, INPUTS), CONSTANTS.by_name(constants)

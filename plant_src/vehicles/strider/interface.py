@@ -55,12 +55,3 @@ VARIABLES = (
     *DECK_OUTPUTS,
     *WORLD_OUTPUTS,
 )
-
-STATES = (
-    "position.x",
-    "position.y",
-    "attitude.yaw",
-    "velocity_body.u",
-    "velocity_body.v",
-    "rates.r",
-)

@@ -1,4 +1,11 @@
-"""Parameters of the catamaran with their sources, and its rigid body, in SI units."""
+"""Parameters of the catamaran with their sources, and its rigid body, in SI units.
+
+Body frame: x forward, y left, z up, origin at the centre of mass.
+
+Sources: [model] the simulation model published with the paper "An Open Simulation Strategy for
+Rapid Control Design in Aerial and Maritime Drone Teams"
+(github.com/OmarVelascoAnrar/UAV_USV_Simulator, commit 1eee757); [paper] its Table 2.
+"""
 
 from __future__ import annotations
 

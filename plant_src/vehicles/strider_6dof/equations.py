@@ -117,26 +117,26 @@ def buoyancy_and_weight(under_water: Immersion, up: ca.SX) -> ca.SX:
 
 
 def damping(now: LoadArguments) -> ca.SX:
-    """Return tau of the linear damping of heave, roll and pitch, and of the drag of the bottoms of the hulls."""
+    """Return tau of the damping of heave, roll and pitch.
+
+    It is linear damping, and the drag of the bottoms of the hulls at four points.
+    """
     w, (roll_rate, pitch_rate) = now.relative_velocity[2], ca.vertsplit(now.rates_in_water)
     load = -ca.vertcat(0, 0, ca.SX(p.DAMPING) * ca.vertcat(w, roll_rate, pitch_rate), 0)
     for x, y in p.DRAG_POINTS:
         speed = w + y * roll_rate - x * pitch_rate
-        load += load_of_force_at(
-            ca.SX([x, y, 0]), ca.vertcat(0, 0, -p.POINT_DRAG * ca.fabs(speed) * speed)
-        )
+        drag = -p.POINT_DRAG * ca.fabs(speed) * speed
+        load += load_of_force_at(ca.SX([x, y, 0]), ca.vertcat(0, 0, drag))
     return load
 
 
 def wind_loads(now: LoadArguments) -> ca.SX:
     """Return the load tau of the air, which acts at the centre of mass."""
-    return load_from_planar(
-        air_drag(now.air_relative_velocity[0], now.air_relative_velocity[1]), 0.0
-    )
+    return load_from_planar(air_drag(*ca.vertsplit(now.air_relative_velocity[0:2])), 0.0)
 
 
 def load_from_planar(load: ca.SX, height: float) -> ca.SX:
-    """Return the load tau (6) of X, Y (N) and N (N m) that act at a height (m) above the centre of mass."""
+    """Return the load tau (6) of X, Y (N) and N (N m) at a height (m) above the centre of mass."""
     return ca.vertcat(load[0:2], 0, -height * load[1], height * load[0], load[2])
 
 

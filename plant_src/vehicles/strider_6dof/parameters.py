@@ -1,8 +1,15 @@
-"""Parameters of the catamaran beyond those of the planar model, in SI units."""
+"""Parameters of the catamaran beyond those of the planar model (`strider/parameters.py`).
+
+SI units. The original moves in the plane, so nothing is published about heave, roll and pitch. All
+values here are computed from the mass and the main dimensions of the model, or marked [assumed].
+The draught follows from the geometry: the bottom of the hulls is 0.144 m below the centre of mass,
+which floats 0.1245 m above the water. The height of the rigid body is part of the state.
+"""
 
 from __future__ import annotations
 
 import math
+from itertools import product
 
 import numpy as np
 
@@ -97,11 +104,8 @@ PLATE_DRAG_COEFFICIENT = 1.2
 
 #: points of the vertical drag (m), two on each hull, with the mean squared distance of the hull
 #: from midships
-DRAG_POINTS = tuple(
-    (x, y)
-    for x in (-HULL_LENGTH / 12**0.5, HULL_LENGTH / 12**0.5)
-    for y in (-HULL_OFFSET, HULL_OFFSET)
-)
+_DRAG_REACH = HULL_LENGTH / 12**0.5
+DRAG_POINTS = tuple(product((-_DRAG_REACH, _DRAG_REACH), (-HULL_OFFSET, HULL_OFFSET)))
 
 #: drag over squared velocity at each point (N s2/m2)
 POINT_DRAG = WATER_DENSITY / 2 * PLATE_DRAG_COEFFICIENT * WATERPLANE_AREA / len(DRAG_POINTS)

@@ -16,14 +16,15 @@ import numpy as np
 from cosim.core.errors import InputError, Problem
 
 from ...json_reader import JsonPath
-from ..common.inertia import (
+from ..common.shapes import (
+    Body,
     Boxes,
+    Vector,
     eigenvalue_problems,
     inertia_problems,
     principal_body,
     symmetry_problems,
 )
-from ..common.shapes import Body, Vector
 from ..common.vehicle_reader import TORQUE_SIGNS, Collision, VehicleReader, edges_around
 
 #: largest number of thrusters

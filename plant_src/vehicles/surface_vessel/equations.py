@@ -24,6 +24,7 @@ from ..vessel.hull import (
     Ballast,
     Hull,
     LoadArguments,
+    hull_of,
     improved_equilibrium,
     load_of_force_at,
     rigid_body_mass_matrix,
@@ -198,18 +199,13 @@ def ballast(constants: NamedValues) -> Ballast:
 
 def hull(constants: NamedValues) -> Hull:
     """Return the vessel with these constants."""
-    return Hull(
-        mass=constants["mass"],
-        centre_of_mass=constants["centre_of_mass"],
+    return hull_of(
+        constants,
         inertia=constants["inertia_tensor"],
         added_mass=square_matrix(constants["added_mass"]),
         coriolis_added_mass=square_matrix(constants["coriolis_added_mass"]),
-        inverse_mass_matrix=constants["inverse_mass_matrix"],
         deck_centre=constants["deck_centre"],
-        equilibrium=constants["equilibrium"],
         strips=twin_hull(constants).strips,
-        wave_count=constants["wave.count"],
-        wave_table=constants["wave_table"],
         loads=lambda now: water_loads(constants, now) + wind_loads(constants, now),
     )
 

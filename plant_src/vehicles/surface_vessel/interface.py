@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 from cosim.core.component import Variable
 
-from ..common.inertia import inertia_variables
 from ..common.interface import (
     CURRENT_INPUTS,
     DECK_OUTPUTS,
@@ -18,11 +17,14 @@ from ..common.interface import (
     WAVE_PARAMETERS,
     WIND_INPUTS,
     WORLD_OUTPUTS,
+    element_states,
+    inertia_variables,
     initial_variables,
+    matrix_parameter,
     parameter,
 )
 from ..vessel.actuators import actuator_inputs, actuator_parameters
-from ..vessel.boat import boat_parameters, matrix_parameter
+from ..vessel.boat import boat_parameters
 from .surface_vessel import SurfaceVessel
 
 _INITIAL_PARAMETERS = (*initial_variables("xy", "uvw", "pqr"), *FLOATING_INITIAL_PARAMETERS)
@@ -65,60 +67,30 @@ def variables(vessel: SurfaceVessel, slots: tuple[int, int] | None = None) -> tu
 
 def _hull_parameters(vessel: SurfaceVessel) -> Iterator[Variable]:
     hull = vessel.hull
-    x, y = hull.drag_point
     yield parameter("waterplane_area", "m2", hull.area, "area of the waterplane of all hulls", 0.0)
-    yield parameter(
-        "transverse_moment",
-        "m4",
-        hull.transverse_moment,
-        "second moment of the waterplane about the x axis",
-        0.0,
-    )
+    text = "second moment of the waterplane about the x axis"
+    yield parameter("transverse_moment", "m4", hull.transverse_moment, text, 0.0)
     text = "second moment of the waterplane about the y axis through its centre"
     yield parameter("longitudinal_moment", "m4", hull.longitudinal_moment, text, 0.0)
-    yield parameter(
-        "waterplane_centre", "m", hull.waterplane_centre, "centre of the waterplane ahead of O"
-    )
-    yield parameter(
-        "strip_beam",
-        "m",
-        hull.strip_beam,
-        "beam of a strip: of each of two hulls, half of that of a single one",
-        0.0,
-    )
+    text = "centre of the waterplane ahead of O"
+    yield parameter("waterplane_centre", "m", hull.waterplane_centre, text)
+    text = "beam of a strip: of each of two hulls, half of that of a single one"
+    yield parameter("strip_beam", "m", hull.strip_beam, text, 0.0)
     yield parameter("hull_length", "m", hull.length, "length of the waterline", 0.0)
-    yield parameter(
-        "hull_depth", "m", hull.depth, "height of the hulls from the bottom to the deck edge", 0.0
-    )
+    text = "height of the hulls from the bottom to the deck edge"
+    yield parameter("hull_depth", "m", hull.depth, text, 0.0)
     yield parameter("hull_bottom", "m", hull.bottom, "height of the bottom of the hulls above O")
-    yield parameter(
-        "drag_point.x",
-        "m",
-        x,
-        "distance of the points of the bottom drag ahead and aft of the waterplane's centre",
-        0.0,
-    )
-    yield parameter(
-        "drag_point.y",
-        "m",
-        y,
-        "distance of the points of the bottom drag from the centre line",
-        0.0,
-    )
-    yield parameter(
-        "vertical_drag_coefficient",
-        "1",
-        hull.vertical_drag_coefficient,
-        "drag coefficient of the bottoms",
-        0.0,
-    )
+    x, y = hull.drag_point
+    text = "distance of the points of the bottom drag"
+    ahead, side = "ahead and aft of the waterplane's centre", "from the centre line"
+    yield parameter("drag_point.x", "m", x, f"{text} {ahead}", 0.0)
+    yield parameter("drag_point.y", "m", y, f"{text} {side}", 0.0)
+    vertical, text = hull.vertical_drag_coefficient, "drag coefficient of the bottoms"
+    yield parameter("vertical_drag_coefficient", "1", vertical, text, 0.0)
     text = "drag coefficient of the immersed sides in cross-flow"
     yield parameter("cross_flow_drag_coefficient", "1", hull.cross_flow_drag_coefficient, text, 0.0)
 
 
 def states(propeller_slots: int) -> tuple[str, ...]:
     """Return the names of the states: those of a vessel, then the propeller speeds."""
-    return (
-        *VESSEL_STATES,
-        *(f"propeller_speed[{number}]" for number in range(1, propeller_slots + 1)),
-    )
+    return (*VESSEL_STATES, *element_states("propeller_speed", propeller_slots))

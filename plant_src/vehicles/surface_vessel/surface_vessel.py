@@ -15,8 +15,7 @@ import numpy as np
 
 from cosim.core.errors import Problem
 
-from ..common.inertia import Boxes, inertia_problems
-from ..common.shapes import Body
+from ..common.shapes import Body, Boxes, inertia_problems
 from ..vessel import boat as boat_data
 from ..vessel.boat import Boat, BoatReader
 

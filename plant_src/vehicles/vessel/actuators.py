@@ -12,9 +12,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from cosim.core.component import Variable
-from cosim.core.units import parse_unit
 
-from ..common.interface import element_labels, parameter
+from ..common.interface import element_commands, element_labels, element_parameters, parameter
 from ..common.shapes import Vector
 
 #: largest numbers of propellers and rudders
@@ -81,49 +80,68 @@ class Rudder:
     propeller: int = 0
 
 
-#: attribute of a propeller -> parameter, unit, description
-PROPELLER_ARRAYS = {
-    "thrust_coefficient": (
+#: attribute of a propeller, and name, unit and description of its parameter
+_PROPELLER_COLUMNS = (
+    ("position", "propeller_position", "m", "position, from O"),
+    ("axis", "propeller_axis", "1", "direction of the thrust"),
+    (
+        "thrust_coefficient",
         "thrust_coefficient",
         "N.s2/rad2",
         "thrust over squared speed at positive speeds",
     ),
-    "reverse_thrust_coefficient": (
+    (
+        "reverse_thrust_coefficient",
         "reverse_thrust_coefficient",
         "N.s2/rad2",
         "thrust over squared speed at negative speeds",
     ),
-    "max_speed": ("max_propeller_speed", "rad/s", "largest speed"),
-    "max_reverse_speed": ("max_reverse_speed", "rad/s", "largest magnitude of negative speeds"),
-    "time_constant": (
+    ("max_speed", "max_propeller_speed", "rad/s", "largest speed"),
+    (
+        "max_reverse_speed",
+        "max_reverse_speed",
+        "rad/s",
+        "largest magnitude of negative speeds",
+    ),
+    (
+        "time_constant",
         "propeller_time_constant",
         "s",
         f"time constant of the speed, at least {MIN_TIME_CONSTANT}; 0: no lag",
     ),
-    "radius": ("propeller_radius", "m", "radius; 0: always immersed, no race"),
-    "advance_coefficient": (
+    ("radius", "propeller_radius", "m", "radius; 0: always immersed, no race"),
+    (
+        "advance_coefficient",
         "advance_coefficient",
         "kg/rad",
         "loss of thrust over speed and axial velocity of the water",
     ),
-    "max_azimuth": ("max_azimuth", "rad", "largest azimuth angle; 0: fixed"),
-}
+    ("max_azimuth", "max_azimuth", "rad", "largest azimuth angle; 0: fixed"),
+)
 #: the same of a rudder
-RUDDER_ARRAYS = {
-    "area": ("rudder_area", "m2", "area"),
-    "max_lift_coefficient": (
+_RUDDER_COLUMNS = (
+    ("position", "rudder_position", "m", "position, from O"),
+    ("area", "rudder_area", "m2", "area"),
+    (
+        "max_lift_coefficient",
         "rudder_lift_coefficient",
         "1",
         "lift coefficient at and beyond the stall angle",
     ),
-    "stall_angle": ("stall_angle", "rad", "angle of attack beyond which the lift is constant"),
-    "max_angle": ("max_rudder_angle", "rad", "largest rudder angle"),
-    "propeller": (
+    (
+        "stall_angle",
+        "stall_angle",
+        "rad",
+        "angle of attack beyond which the lift is constant",
+    ),
+    ("max_angle", "max_rudder_angle", "rad", "largest rudder angle"),
+    (
+        "propeller",
         "rudder_propeller",
         "1",
         "number of the propeller in whose race the rudder is; 0: none",
     ),
-}
+)
 
 
 def actuator_parameters(
@@ -133,52 +151,15 @@ def actuator_parameters(
 
     `slots` are the numbers of elements of the arrays of propellers and of rudders.
     """
-    yield from _kind_parameters(
-        "propeller", propellers, PROPELLER_ARRAYS, ("position", "axis"), slots[0]
+    kinds: tuple[tuple[str, Sequence[object], tuple[tuple[str, str, str, str], ...]], ...] = (
+        ("propeller", propellers, _PROPELLER_COLUMNS),
+        ("rudder", rudders, _RUDDER_COLUMNS),
     )
-    yield from _kind_parameters("rudder", rudders, RUDDER_ARRAYS, ("position",), slots[1])
-
-
-def _kind_parameters(
-    kind: str,
-    elements: Sequence[Propeller | Rudder],
-    arrays: dict[str, tuple[str, str, str]],
-    vectors: tuple[str, ...],
-    slots: int,
-) -> Iterator[Variable]:
-    if not slots:
-        return
-    yield parameter(
-        f"{kind}_count", "1", float(len(elements)), f"number of {kind}s", 0.0, float(slots)
-    )
-    for name in vectors:
-        unit, text = (
-            ("m", f"{name}, from O") if name == "position" else ("1", "direction of the thrust")
-        )
-        for k, letter in enumerate("xyz"):
-            values = [getattr(element, name)[k] for element in elements]
-            yield _array(
-                f"{kind}_{name}.{letter}",
-                unit,
-                f"{kind}s: {text}: {letter}, body frame",
-                values,
-                slots,
-            )
-    for attribute, (name, unit, text) in arrays.items():
-        yield _array(
-            name,
-            unit,
-            f"{kind}s: {text}",
-            [float(getattr(element, attribute)) for element in elements],
-            slots,
-        )
-
-
-def _array(name: str, unit: str, description: str, values: Sequence[float], slots: int) -> Variable:
-    start = (*values, *[0.0] * (slots - len(values)))
-    return Variable(
-        name, "Float64", "parameter", "fixed", start, parse_unit(unit), (slots,), description
-    )
+    for (kind, elements, columns), count in zip(kinds, slots, strict=True):
+        if count:
+            number, text = float(len(elements)), f"number of {kind}s"
+            yield parameter(f"{kind}_count", "1", number, text, 0.0, float(count))
+            yield from element_parameters(kind, elements, columns, count)
 
 
 def actuator_inputs(
@@ -190,29 +171,18 @@ def actuator_inputs(
     """
     labels = element_labels([each.label for each in propellers], slots[0], "propeller_count")
     angles = element_labels([each.label for each in rudders], slots[1], "rudder_count")
-    yield _command("propeller_speed", "rad/s", f"commanded propeller speeds ({labels})", slots[0])
+    yield element_commands(
+        "propeller_speed", "rad/s", f"commanded propeller speeds ({labels})", slots[0]
+    )
     if slots[0] > len(propellers) or any(propeller.max_azimuth for propeller in propellers):
         text = (
             f"azimuth angles ({labels}), without lag; positive: the thrust turns to port, at the "
             "stern the bow to starboard"
         )
-        yield _command("azimuth", "rad", text, slots[0])
+        yield element_commands("azimuth", "rad", text, slots[0])
     if slots[1]:
         text = (
             f"rudder angles ({angles}); positive: trailing edge to starboard, bow to starboard, "
             "yaw decreases"
         )
-        yield _command("rudder_angle", "rad", text, slots[1])
-
-
-def _command(name: str, unit: str, description: str, slots: int) -> Variable:
-    start, shape = (0.0,) * slots, (slots,)
-    return Variable(
-        name,
-        "Float64",
-        "input",
-        start=start,
-        unit=parse_unit(unit),
-        shape=shape,
-        description=description,
-    )
+        yield element_commands("rudder_angle", "rad", text, slots[1])

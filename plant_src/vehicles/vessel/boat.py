@@ -18,12 +18,10 @@ import numpy as np
 
 from cosim.core.component import Variable
 from cosim.core.errors import InputError, Problem
-from cosim.core.units import parse_unit
 
 from ...json_reader import JsonPath
-from ..common.inertia import Boxes, eigenvalue_problems, symmetry_problems
-from ..common.interface import parameter
-from ..common.shapes import Body, Vector
+from ..common.interface import matrix_parameter, parameter, vector_parameters
+from ..common.shapes import Body, Boxes, Vector, eigenvalue_problems, symmetry_problems
 from ..common.vehicle_reader import Collision, CollisionBox, VehicleReader
 from .actuators import MAX_PROPELLERS, MAX_RUDDERS, MIN_TIME_CONSTANT, Propeller, Rudder
 
@@ -109,36 +107,10 @@ class Boat:
         return len(self.propellers), len(self.rudders)
 
 
-def matrix_parameter(name: str, description: str, matrix: np.ndarray) -> Variable:
-    """Return a parameter that is a matrix, in SI units."""
-    start = tuple(np.ravel(matrix).tolist())
-    return Variable(
-        name,
-        "Float64",
-        "parameter",
-        "fixed",
-        start,
-        parse_unit("1"),
-        matrix.shape,
-        f"{description}, SI units",
-    )
-
-
-def vector_parameters(
-    name: str, letters: str, unit: str, description: str, values: Sequence[float]
-) -> Iterator[Variable]:
-    """Yield a parameter for each component of a vector."""
-    for letter, value in zip(letters, values, strict=True):
-        yield parameter(
-            f"{name}.{letter}", unit, float(value), f"{description}: {letter}, body frame"
-        )
-
-
 def boat_parameters(boat: Boat, velocities: str) -> Iterator[Variable]:
     """Yield the parameters of both families; `velocities` are the names of the elements of nu."""
-    yield from vector_parameters(
-        "centre_of_mass", "xyz", "m", "centre of mass from O", boat.centre_of_mass
-    )
+    centre, text = boat.centre_of_mass, "centre of mass from O"
+    yield from vector_parameters("centre_of_mass", "m", centre, text)
     yield parameter("water_density", "kg/m3", boat.water_density, "density of the water", 0.0)
     for name, text in (
         ("added_mass", "added mass about O"),
@@ -146,15 +118,12 @@ def boat_parameters(boat: Boat, velocities: str) -> Iterator[Variable]:
         ("linear_damping", "load over velocity relative to the water"),
     ):
         yield matrix_parameter(name, f"{text}, for {velocities}", getattr(boat, name))
-    yield from vector_parameters(
-        "air_drag", "xy", "kg/m", "force over squared air velocity", boat.air_drag
-    )
-    yield from vector_parameters(
-        "air_centre", "xyz", "m", "point at which the air drag acts, from O", boat.air_centre
-    )
-    yield from vector_parameters(
-        "deck_centre", "xyz", "m", "centre of the top of the landing deck, from O", boat.deck_centre
-    )
+    text = "force over squared air velocity"
+    yield from vector_parameters("air_drag", "kg/m", boat.air_drag, text)
+    text = "point at which the air drag acts, from O"
+    yield from vector_parameters("air_centre", "m", boat.air_centre, text)
+    text = "centre of the top of the landing deck, from O"
+    yield from vector_parameters("deck_centre", "m", boat.deck_centre, text)
 
 
 _Boat = TypeVar("_Boat", bound=Boat)

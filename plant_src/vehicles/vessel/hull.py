@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 
@@ -204,7 +205,10 @@ class Hull:
         )
 
     def rate(self, state: ca.SX, inputs: NamedValues) -> ca.SX:
-        """Return the time derivative of position, quaternion, nu and time (`vehicles/README.md`)."""
+        """Return the time derivative of position, quaternion, nu and time.
+
+        In the current and the waves (Fossen 2021, chapter 10; `vehicles/README.md`).
+        """
         orientation, nu = state[3:7], state[7:13]
         frame = self.frame(orientation)
         rates = nu[3:6]
@@ -283,6 +287,25 @@ class Hull:
             state[0:3] + to_deck,
             origin_velocity + ca.cross(angular_velocity, to_deck),
         )
+
+
+def hull_of(constants: NamedValues, **others: Any) -> Hull:
+    """Return the vessel with these constants.
+
+    Args:
+        constants: Constants of the equations; mass, centre of mass, mass matrix, equilibrium and
+            waves are among them by these names.
+        **others: Further attributes of the vessel.
+    """
+    return Hull(
+        mass=constants["mass"],
+        centre_of_mass=constants["centre_of_mass"],
+        inverse_mass_matrix=constants["inverse_mass_matrix"],
+        equilibrium=constants["equilibrium"],
+        wave_count=constants["wave.count"],
+        wave_table=constants["wave_table"],
+        **others,
+    )
 
 
 def coriolis_load(mass: ca.SX, nu: ca.SX) -> ca.SX:

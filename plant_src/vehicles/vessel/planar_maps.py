@@ -1,4 +1,4 @@
-"""Contact functions (`common/contact_maps.py`) of vessels in the horizontal plane."""
+"""Contact functions (`common/contact_maps.py`) and outputs of vessels in the horizontal plane."""
 
 from __future__ import annotations
 
@@ -131,3 +131,21 @@ def _minmod(a: ca.SX, b: ca.SX) -> ca.SX:
 def _planar_rotation(yaw: ca.SX) -> ca.SX:
     """Return the rotation matrix (2, 2) body to world frame."""
     return ca.vertcat(ca.horzcat(ca.cos(yaw), -ca.sin(yaw)), ca.horzcat(ca.sin(yaw), ca.cos(yaw)))
+
+
+def planar_outputs(state: ca.SX, height: ca.SX, deck: ca.SX) -> ca.SX:
+    """Return the motion outputs of a planar vessel and of its landing deck.
+
+    Args:
+        state: State, which begins with that of `interface.PLANAR_STATES`.
+        height: Height of the centre of mass (m, world frame).
+        deck: Centre of the top of the landing deck from the centre of mass (m, body frame).
+    """
+    position = ca.vertcat(state[0:2], height)
+    orientation = kinematics.quaternion_about_z(state[2])
+    to_world = kinematics.rotation_matrix(orientation)
+    rates = ca.vertcat(0, 0, state[5])
+    velocity = to_world @ ca.vertcat(state[3:5], 0)
+    to_deck = to_world @ deck
+    motion = kinematics.motion_outputs(position, orientation, velocity, rates)
+    return ca.vertcat(motion, position + to_deck, velocity + ca.cross(rates, to_deck))

@@ -1,4 +1,4 @@
-"""Equations of a vessel in six degrees of freedom as a model for export, and its contact functions."""
+"""Equations of a vessel in six degrees of freedom for export, and its contact functions."""
 
 from __future__ import annotations
 

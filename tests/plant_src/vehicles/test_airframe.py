@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from cosim.core.errors import InputError
 from plant_src.catalogue import MODELS
-from plant_src.vehicles.common.inertia import principal_axes
+from plant_src.vehicles.common.shapes import principal_axes
 from plant_src.vehicles.multirotor.airframe import Airframe, Rotor, RotorEffects
 
 assert MODELS["crazyflie"].airframe is not None

@@ -3,6 +3,7 @@
 import json
 from contextlib import nullcontext
 from hashlib import sha256
+from itertools import product
 
 import pytest
 
@@ -205,9 +206,8 @@ def test_start_values_units_and_types_of_a_roles_parameters_are_those_of_a_shipp
     ]
     types = {"Float64": "Real", "Int32": "Integer", "Boolean": "Boolean"}
     for parameter, spec in role.parameters.items():
-        found = next(
-            each[key] for each in shipped for key in (parameter, f"{parameter}[1]") if key in each
-        )
+        keys = product(shipped, (parameter, f"{parameter}[1]"))
+        found = next(each[key] for each, key in keys if key in each)
         assert (types[found.type], found.start, found.unit.name if found.unit else "") == (
             spec.type,
             spec.start,
@@ -291,9 +291,10 @@ def test_a_run_is_current_until_a_file_of_it_changes(tmp_path):
 
 
 def candidate_of(inputs=(), outputs=(), parameters=()):
-    return CandidateInterface(
-        *({name: Variable(name) for name in names} for names in (inputs, outputs, parameters))
-    )
+    def named(names):
+        return {name: Variable(name) for name in names}
+
+    return CandidateInterface(named(inputs), named(outputs), named(parameters))
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,14 @@
 """Without contact the plant FMUs and the PyBullet world are the same plant."""
 
+from itertools import product
+
 import numpy as np
 
 import cosim
 from cosim.core.resources import root
 
 MOTION = [
-    *(f"{group}.{axis}" for group in ("position", "velocity") for axis in "xyz"),
+    *map(".".join, product(("position", "velocity"), "xyz")),
     *(f"attitude.{angle}" for angle in ("roll", "pitch", "yaw")),
     *(f"rates.{rate}" for rate in "pqr"),
 ]

@@ -7,6 +7,7 @@ Run this file to write the table.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 SECURITY = Path(__file__).parents[3] / "SECURITY.md"
@@ -160,7 +161,7 @@ CLASSES: dict[str, list[Attack]] = {
         Attack("fixed_addresses", "switch off address randomization"),
     ],
 }
-ATTACKS = [attack for attacks in CLASSES.values() for attack in attacks]
+ATTACKS = list(chain.from_iterable(CLASSES.values()))
 
 FAULTS = [
     Fault("segv", "read at address 0", SIGNAL + "11", NAMED),

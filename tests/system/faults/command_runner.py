@@ -36,15 +36,11 @@ class CommandResult:
     @cached_property
     def rows(self) -> list[dict[str, float]]:
         """Rows of the result file; none where there is no file."""
-        files = [
-            path
-            for name in ("result.csv", "out/result.csv")
-            if (path := self.folder / name).is_file()
-        ]
-        with (files[0] if files else Path(os.devnull)).open() as file:
-            return [
-                {name: float(value) for name, value in row.items()} for row in csv.DictReader(file)
-            ]
+        paths = [self.folder / "result.csv", self.folder / "out" / "result.csv"]
+        path = next(filter(Path.is_file, paths), Path(os.devnull))
+        with path.open() as file:
+            table = list(csv.reader(file))
+        return [dict(zip(table[0], map(float, line), strict=True)) for line in table[1:]]
 
     @cached_property
     def changes(self) -> list[str]:

@@ -42,9 +42,7 @@ def calls(lines: Iterable[str]) -> Iterator[tuple[str, str]]:
 
 def letter(function: str) -> str:
     name = function.removesuffix("CoSimulation")
-    return CALL_LETTERS.get(
-        name, "s" if name.startswith("Set") else "g" if name.startswith("Get") else "?"
-    )
+    return CALL_LETTERS.get(name) or {"Set": "s", "Get": "g"}.get(name[:3], "?")
 
 
 def life_cycle(lines: Iterable[str]) -> str:

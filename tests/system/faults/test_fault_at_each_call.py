@@ -7,6 +7,7 @@ A short sample of the calls always, all of them with `pytest -m long`.
 from __future__ import annotations
 
 import re
+from itertools import product
 
 import pytest
 from fault_fmu import STEP_COUNT, FaultFmus
@@ -38,11 +39,10 @@ def expected_rows(names: list[str], n: int) -> int:
     """Row 0 exists after the first Get in step mode, row k after the Get that follows the k-th
     DoStep.
     """
-    stepping = "".join(
-        "X" if "ExitInit" in name else "G" if name.startswith("Get") else "."
-        for name in names[: n - 1]
-    )
-    return stepping.partition("X")[2].count("G")
+    before = names[: n - 1]
+    exits = [i for i, name in enumerate(before) if "ExitInit" in name]
+    stepping = before[exits[0] :] if exits else []
+    return sum(name.startswith("Get") for name in stepping)
 
 
 def judge(
@@ -55,9 +55,10 @@ def judge(
     )
     where = f"{what} at call {n} ({name}): {done.err}"
     is_null_text = name in TEXT_CALLS and what in RETURNS
-    assert done.code in (
-        (0,) if is_null_text or what in ("warning", "nan") else (0, 1) if name in LAST else (1,)
-    ), where
+    codes = (0, 1) if name in LAST else (1,)
+    if is_null_text or what in ("warning", "nan"):
+        codes = (0,)
+    assert done.code in codes, where
     assert len(done.rows) == (
         expected_rows(names, n) if done.code and name not in LAST else STEP_COUNT + 1
     ), where
@@ -75,9 +76,7 @@ def test_a_healthy_run_is_long_enough(healthy):
 
 
 @pytest.mark.parametrize("what", RETURNS + CRASHES)
-@pytest.mark.parametrize(
-    ("version", "n"), [(version, n) for version, sample in SAMPLE.items() for n in sample]
-)
+@pytest.mark.parametrize(("version", "n"), [*product([2], SAMPLE[2]), *product([3], SAMPLE[3])])
 def test_a_fault_at_some_calls(fmus, runner, healthy, version, n, what):
     names = healthy[version]
     judge(fmus, runner, names, version, n if n > 0 else len(names) + 1 + n, what)

@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from dataclasses import dataclass
+from itertools import product
 
 import pytest
 from command_runner import CommandResult
@@ -269,12 +270,8 @@ OTHER_FORKS = [
 @pytest.mark.parametrize(
     ("order", "isolation", "executor"),
     [
-        *[(order, isolation, "native") for order in FORKS for isolation in ("run", "fmu", "none")],
-        *[
-            (f"{moment} fork_return", isolation, "python")
-            for moment in OTHER_FORKS
-            for isolation in ("run", "fmu")
-        ],
+        *product(FORKS, ("run", "fmu", "none"), ["native"]),
+        *product([f"{moment} fork_return" for moment in OTHER_FORKS], ("run", "fmu"), ["python"]),
     ],
 )
 def test_a_forked_copy_does_not_continue_the_run(

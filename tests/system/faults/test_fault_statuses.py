@@ -60,7 +60,9 @@ CASES = [
     ),
     Case("DoStep 6 log_long", "WARNING lag: yyyy", 0, STEP_COUNT + 1),
 ]
-TABLE = [pytest.param(case, v, id=f"FMI{v} {case.order}") for case in CASES for v in case.versions]
+TABLE = []
+for each in CASES:
+    TABLE += [pytest.param(each, v, id=f"FMI{v} {each.order}") for v in each.versions]
 
 
 @pytest.mark.parametrize(("case", "version"), TABLE)

@@ -86,14 +86,9 @@ VALUES = st.one_of(
 
 def all_paths(value: Any, path: Path_ = ()) -> Iterator[Path_]:
     """The paths of everything below a JSON value."""
-    inner = (
-        value.items()
-        if isinstance(value, dict)
-        else enumerate(value)
-        if isinstance(value, list)
-        else ()
-    )
-    for key, element in inner:
+    if not isinstance(value, dict | list):
+        return
+    for key, element in value.items() if isinstance(value, dict) else enumerate(value):
         yield (*path, key)
         yield from all_paths(element, (*path, key))
 

@@ -84,9 +84,9 @@ def alone(
     from cosim import cli
 
     file = folder / "result.csv"
-    values = [
-        word for name, value in start.items() for word in ("--start-value", f"{name}={value!r}")
-    ]
+    values = []
+    for name, value in start.items():
+        values += ["--start-value", f"{name}={value!r}"]
     words = [
         "simulate",
         str(fmu),
