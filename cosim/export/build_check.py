@@ -20,7 +20,7 @@ from ..core.component_log import discard_messages
 from ..core.errors import ComponentError, CosimError, Problem
 from .build import fmu_files, read_manifest
 from .cache import file_hash
-from .sources import Source, export_source, find_sources
+from .fmu_sources import Source, export_source, find_sources
 
 
 def check_fmus(root: Path) -> list[Problem]:
@@ -165,7 +165,7 @@ def _difference_of_results(first: Future[list[Trace]], second: Future[list[Trace
 
 
 def first_difference(first: Trace, second: Trace) -> str:
-    """Return a description of the first difference between two traces, or "" if they agree within the tolerances."""
+    """Return the first difference between two traces, or "" if they agree within the tolerances."""
     first_variables = {variable.name: variable for variable in first.variables}
     second_variables = {variable.name: variable for variable in second.variables}
     for name in sorted(first_variables.keys() | second_variables.keys()):

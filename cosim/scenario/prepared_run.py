@@ -30,6 +30,7 @@ from ..engine.settings import Settings
 from ..process.float_mode import default_float_mode
 from ..process.journal import Deadlines, current_journal
 from ..process.process_state import exclusive_process_state
+from ..results import RunMetadata
 from .evaluation_schema import FunctionSpec
 from .file_paths import SHIPPED
 from .json_document import Document
@@ -130,7 +131,7 @@ class PreparedRun:
     @cached_property
     # paths may be relative, and a component of another thread may change the working directory
     @exclusive_process_state()
-    def metadata(self) -> dict[str, Any]:
+    def metadata(self) -> RunMetadata:
         """Metadata of the run that are known before it.
 
         Scenario, system, versions, hashes of all files.
@@ -145,7 +146,7 @@ class PreparedRun:
         }
 
     @property
-    def origin(self) -> dict[str, Any]:
+    def origin(self) -> RunMetadata:
         """Name, content and file of the scenario, and the caller's values of variables."""
         return {
             "name": self.spec.name,

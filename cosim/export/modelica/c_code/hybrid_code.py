@@ -28,7 +28,7 @@ from ..model.syntax_tree import Assign, Name
 from .c_values import C_TYPES, CExpression, CValue, function_definition, scalar_value
 from .model_code import ModelCode
 from .model_step import hybrid_step_body
-from .statements import StatementLowering
+from .statement_lowering import StatementLowering
 
 
 @dataclass
@@ -77,7 +77,7 @@ class HybridCode(ModelCode):
         ]
 
     def _endless_codes(self) -> dict[str, str]:
-        """Return the failure code of an event iteration that does not end by the variable that changes."""
+        """Return variable -> failure code of an event iteration that it does not let end."""
         hybrid, variables = self.model.hybrid, self.model.variables
         assert hybrid
         names = iterated_names(hybrid)

@@ -1,4 +1,4 @@
-"""Result of the analysis of a model: its schedule, the roles of its parameters and its default values."""
+"""Result of the analysis of a model: schedule, roles of parameters, default values."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..model.evaluate import Evaluator, convert_to_type
 from ..model.flat_model import Model, Variable, is_input
 from ..model.syntax_tree import raise_model_error
 from ..model.traversal import variable_names
-from .schedule import Schedule, build_schedule, declared_value, start_value
+from .computation_order import Schedule, build_schedule, declared_value, start_value
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,10 @@ class AnalysedModel:
             self.assign(name, self.evaluate(declared_value(self.model, name)))
 
     def apply_start_values(self, inputs: bool) -> None:
-        """Set all variables that are not parameters to their start values; inputs only if `inputs`."""
+        """Set all variables but parameters to their start values.
+
+        Inputs are only set if `inputs` is true.
+        """
         for variable in self.model.variables.values():
             if variable.variability not in ("parameter", "constant") and (
                 inputs or not is_input(variable)

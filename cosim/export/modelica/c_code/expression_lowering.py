@@ -25,7 +25,7 @@ from ..model.syntax_tree import (
     raise_model_error,
 )
 from ..model.traversal import unroll
-from .builtin_functions import BuiltinLowering
+from .builtin_lowering import BuiltinLowering
 from .c_values import (
     CExpression,
     CValue,
@@ -229,7 +229,10 @@ class ExpressionLowering(BuiltinLowering):
         )
 
     def known_branch(self, node: If) -> Expression | None:
-        """Return the value of an if-expression without the branches before it, if the first condition is constant, else None."""
+        """Return an if-expression without its first condition if that is constant, else None.
+
+        It is the value of the first branch, or the expression without this branch.
+        """
         condition, value = node.branches[0]
         known = self.static_value(condition)
         if known is None:
