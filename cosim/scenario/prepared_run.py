@@ -12,13 +12,13 @@ from hashlib import sha256
 from os.path import relpath
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
 from ..components.fmi import FmuFile, Isolation
 from ..core import resources
-from ..core.errors import InputError, Problem
+from ..core.errors import Problem
 from ..core.paths import resolve_path
 from ..core.system import System
 from ..core.text import count_noun
@@ -262,12 +262,6 @@ def load(
         InputError: The scenario cannot be run; `problems` lists all reasons, each with file, line
             and JSON path.
     """
-    _check_choices(isolation=(isolation, IsolationMode), late=(late, LatePolicy))
-    if not isinstance(sandbox, bool):
-        raise InputError(
-            f"sandbox: expected True or False, found {sandbox!r}; only the command line has the "
-            "strict sandbox"
-        )
     times = {"/stop_time": stop_time, "/step_size": step_size}
     settings = {
         **{key: _json_time(value) for key, value in times.items() if value is not None},
@@ -307,15 +301,6 @@ def load(
         loaded.assignments,
         watch.seconds,
     )
-
-
-def _check_choices(**options: tuple[object, Any]) -> None:
-    """Check that each option, given with the Literal of its values, has one of them."""
-    for name, (value, kind) in options.items():
-        if value not in get_args(kind):
-            raise InputError(
-                f"{name}: expected one of {', '.join(map(repr, get_args(kind)))}; found {value!r}"
-            )
 
 
 def _json_time(value: TimeValue) -> float | str:
