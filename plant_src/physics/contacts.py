@@ -127,6 +127,8 @@ class Contacts:
         Returns:
             Number of vehicles with contact since the last `clear`.
         """
+        # Points are summed for each pair of bodies. The speed of a collision is the difference of
+        # the velocities before Bullet's step; that of a planar vessel along z only holds it up.
         self.has_contacts = True
         forces: dict[tuple[int, int], float] = {}
         for point in pybullet.getContactPoints(*self._query):  # keyword arguments take longer
