@@ -285,7 +285,10 @@ class HybridInterpreter(Interpreter):
         return [_element(self.values, key) for key in self._rates]
 
     def _crossed(self, time: float) -> tuple[bool, list[float]]:
-        """Return whether a relation differs from its stored value, and the differences of the operands of all relations."""
+        """Return whether a relation differs from its stored value.
+
+        Also return the differences of the operands of all relations.
+        """
         self.values["time"] = time
         self.evaluate.execute(self.schedule.between.indicators)
         changed, differences = False, []
@@ -358,7 +361,10 @@ class HybridInterpreter(Interpreter):
     def _locate(
         self, time: float, h: float, start: Sequence[float], slopes: list[list[float]]
     ) -> float:
-        """Return the first time in (time, time + h] after which a relation has changed, with the states of this time."""
+        """Return the first time in (time, time + h] after which a relation has changed.
+
+        Also return the states of this time.
+        """
         width = max(1e-10, 8 * 2.0**-52 * abs(time + h))
         left, right, after = 0.0, h, self._crossed(time + h)[1]
         self._set_states(start)
