@@ -10,9 +10,10 @@ from .fleet.sampled_controller import SampledController
 
 
 class AttitudeController(SampledController):
-    """PIDs from angle errors in degrees (commands and measurements in rad) to throttle differences in %.
+    """PIDs from angle errors to throttle differences (%).
 
-    Gains of the published simulator, the same in controllers/modelica/AttitudeController.mo.
+    The errors are in degrees, commands and measurements in rad. Gains of the published
+    simulator, the same in controllers/modelica/AttitudeController.mo.
     """
 
     description = "Roll, pitch and yaw loops: from attitude commands to throttle differences"

@@ -9,9 +9,10 @@ from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
 
 class CourseKeeper(Fmi2Slave):
-    """Proportional speed control by thrust and PD course control by rudder, with the yaw rate as derivative.
+    """Proportional speed control by thrust and PD course control by rudder.
 
-    A positive rudder angle turns the bow to starboard and reduces the yaw angle. SI units, angles in rad.
+    The yaw rate is the derivative. A positive rudder angle turns the bow to starboard and reduces
+    the yaw angle. SI units, angles in rad.
     """
 
     description = "Keeps a course and a speed"

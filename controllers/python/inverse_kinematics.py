@@ -15,11 +15,12 @@ from .fleet.sampled_controller import SampledController
 
 
 class InverseKinematics(SampledController):
-    """Inverse kinematics of the thrust vector, equations 14 to 20 of the paper, in the world frame (east, north, up).
+    """Inverse kinematics of the thrust vector, equations 14 to 20 of the paper.
 
-    The vertical force is the output of an altitude PID behind a low-pass, as in the published simulator; both start at hover.
-    The attitude loops receive the yaw command unchanged: the yaw angle of the desired rotation differs from it only in second
-    order of the tilt.
+    World frame: east, north, up. The vertical force is the output of an altitude PID behind a
+    low-pass, as in the published simulator; both start at hover. The attitude loops receive the yaw
+    command unchanged: the yaw angle of the desired rotation differs from it only in second order of
+    the tilt.
     """
 
     description = (
@@ -65,7 +66,10 @@ class InverseKinematics(SampledController):
         )
 
     def tick(self, time: float) -> None:
-        """Compute the commands from the force t = m (x'', y'', z'' + g) (equation 15), its z component from the altitude PID."""
+        """Compute the commands from the force t = m (x'', y'', z'' + g) (equation 15).
+
+        The altitude PID gives its z component.
+        """
         command, mass = self.acceleration_command, self.mass
         force_x, force_y = (0.0, 0.0) if self.reset else (mass * command.x, mass * command.y)
         force_z = self._vertical_force()

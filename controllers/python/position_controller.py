@@ -11,9 +11,10 @@ from .fleet.sampled_controller import SampledController
 
 
 class PositionController(SampledController):
-    """Cascade of position PIDs and velocity PIDs with tilt commands as outputs (degrees inside, rad outside).
+    """Cascade of position PIDs and velocity PIDs with tilt commands as outputs.
 
-    Errors in the world frame are rotated to the heading frame (forward, left). Gains of the published simulator, the same in
+    The angles are in degrees inside and in rad outside. Errors in the world frame are rotated to
+    the heading frame (forward, left). Gains of the published simulator, the same in
     controllers/modelica/PositionController.mo.
     """
 

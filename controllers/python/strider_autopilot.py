@@ -1,4 +1,4 @@
-"""Waypoint guidance, speed and heading control of a vessel with thruster and rudder in one block."""
+"""Waypoint guidance, speed and heading control of a vessel with thruster and rudder."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from .fleet.waypoint_guidance import WaypointGuidanceBase
 
 
 class StriderAutopilot(WaypointGuidanceBase, SpeedControl, HeadingControl):
-    """Guidance, speed and heading control in one sample, equivalent to scenarios/systems/strider_autopilot.json."""
+    """Guidance, speed and heading control in one sample.
+
+    It is equivalent to scenarios/systems/strider_autopilot.json.
+    """
 
     description = (
         "Waypoint guidance, speed and heading control of a vessel with thruster and rudder in one "

@@ -158,8 +158,7 @@ class Vtol(SampledController):
         self.home_x, self.home_y, self.home_z = position.x, position.y, position.z
         self.home_yaw = self.vehicle.attitude.yaw
 
-    # -- flight modes
-    # ----------------------------------------------------------------------------------------------------------
+    # -- flight modes ------------------------------------------------------------------------------
 
     @property
     def _landed_altitude(self) -> float:
@@ -217,8 +216,7 @@ class Vtol(SampledController):
             self.committed or (self.calm and self.altitude_reference <= lowest)
         )
 
-    # -- outputs
-    # ---------------------------------------------------------------------------------------------------------------
+    # -- outputs -----------------------------------------------------------------------------------
 
     def _update_motor_share(self) -> None:
         direction = -1 if self.mode in (FlightMode.IDLE, FlightMode.LANDED) else 1
@@ -270,5 +268,8 @@ class Vtol(SampledController):
 
 
 def _has_elapsed(elapsed: float, duration: float) -> bool:
-    """Return True if a sum of sample periods has reached a duration (s), with a tolerance of half a period for rounding."""
+    """Return True if a sum of sample periods has reached a duration (s).
+
+    The tolerance is half a period, for rounding.
+    """
     return elapsed >= duration - SAMPLE_PERIOD / 2

@@ -184,8 +184,8 @@ def _read_result(source: ResultSource) -> Result:
     if isinstance(source, Result):
         return source
     path = Path(source)
-    folder = path if path.is_dir() else path.parent if path.name == "result.csv" else None
-    if folder and (folder / "run.json").exists():
+    folder = path.parent if path.name == "result.csv" else path
+    if (folder / "run.json").exists():
         from ..report.runs import read_run  # its units: angles of a whole turn are equal
 
         return read_run(folder)

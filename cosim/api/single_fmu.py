@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from itertools import chain
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -20,7 +21,7 @@ from ..components.fmi import (
 )
 from ..components.input_table import InputTable, make_input_table, parse_cell, read_input_table
 from ..core import component_log
-from ..core.component import Component, Variable
+from ..core.component import Component, Variable, scalars_of
 from ..core.errors import ComponentError, InputError, Problem, did_you_mean
 from ..core.system import Connection, Endpoint, System
 from ..core.time_grid import exact_divisor, exact_fraction
@@ -209,25 +210,21 @@ def parse_solver(method: Method | None, step_size: float | str | None) -> Solver
 
 
 def _recorded_names(component: Component, output: Sequence[str] | None) -> list[str]:
-    scalars = {
-        scalar: variable for variable in component.variables for scalar in variable.scalar_names
-    }
     if output is None:
-        return [scalar for scalar, variable in scalars.items() if variable.causality == "output"]
+        return list(scalars_of(component.variables, "output"))
+    scalars = scalars_of(component.variables)
     arrays = {variable.name: variable.scalar_names for variable in component.variables}
     if unknown := [name for name in output if name not in scalars and name not in arrays]:
         raise InputError(
             Problem(f'the FMU has no variable "{name}"{did_you_mean(name, scalars)}', "output")
             for name in unknown
         )
-    return [scalar for name in output for scalar in arrays.get(name, (name,))]
+    return list(chain.from_iterable(arrays.get(name, (name,)) for name in output))
 
 
 def _read_inputs(values: InputValues, component: Component) -> InputTable:
     """Return the table of the inputs of an FMU."""
-    inputs = {
-        slot: v for v in component.variables if v.causality == "input" for slot in v.scalar_names
-    }
+    inputs = scalars_of(component.variables, "input")
     file = Path(values) if isinstance(values, str | os.PathLike) else None
     columns = read_rows(file)[0][1:] if file else _column_names(values)
     if unknown := [column for column in columns if column not in inputs]:
@@ -245,14 +242,10 @@ def _column_names(values: Any) -> list[str]:
 
     `values` is a dict, a pandas DataFrame or a structured array.
     """
-    found = (
-        values.dtype.names
-        if isinstance(values, np.ndarray)
-        else values
-        if hasattr(values, "keys")
-        else ()
-    )
-    names = list(found or ())
+    if isinstance(values, np.ndarray):
+        names = list(values.dtype.names or ())
+    else:
+        names = list(values) if hasattr(values, "keys") else []
     text = 'a CSV file, or columns by name with a column "time"'
     expect("input", values, "time" in names and all(isinstance(name, str) for name in names), text)
     return [name for name in names if name != "time"]

@@ -119,9 +119,8 @@ class Variable:
 @lru_cache(16)
 def _subscripts(shape: tuple[int, ...]) -> Sequence[str]:
     """Return "[1]", "[2]" or "[1,2]" for each element of an array."""
-    return [
-        f"[{','.join(map(str, index))}]" for index in product(*(range(1, n + 1) for n in shape))
-    ]
+    indices = product(*(range(1, n + 1) for n in shape))
+    return [f"[{','.join(map(str, index))}]" for index in indices]
 
 
 def count_scalars(variables: Iterable[Variable]) -> int:
@@ -130,6 +129,15 @@ def count_scalars(variables: Iterable[Variable]) -> int:
     An array counts with all its elements.
     """
     return sum(math.prod(variable.shape) for variable in variables)
+
+
+def scalars_of(variables: Iterable[Variable], *causalities: str) -> dict[str, Variable]:
+    """Return the variables of these causalities, or all, by the names of their scalars."""
+    scalars: dict[str, Variable] = {}
+    for variable in variables:
+        if not causalities or variable.causality in causalities:
+            scalars |= dict.fromkeys(variable.scalar_names, variable)
+    return scalars
 
 
 class StepResult(NamedTuple):
@@ -144,7 +152,10 @@ class StepResult(NamedTuple):
 
 
 class NativeGetSet(NamedTuple):
-    """Call of a C function fmiXGet... or fmiXSet...; all members but `version` (2 or 3) and the counts are addresses."""
+    """Call of a C function fmiXGet... or fmiXSet....
+
+    All members but `version` (2 or 3) and the counts are addresses.
+    """
 
     version: int
     function: int
@@ -273,7 +284,10 @@ class Component(Protocol):
         """
 
     def unit_source(self, name: str) -> str:  # noqa: ARG002
-        """Return the declaration of a variable's unit for messages, such as "Pilot.units (pilot.py:7)"; "" if it is unknown."""
+        """Return where the unit of a variable is declared, for messages.
+
+        Such as "Pilot.units (pilot.py:7)"; "" if it is unknown.
+        """
         return ""
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
@@ -314,7 +328,7 @@ class Component(Protocol):
         outputs: Sequence[str],  # noqa: ARG002
         input_name: str,  # noqa: ARG002
     ) -> Sequence[float] | None:
-        """Return the partial derivatives of outputs with respect to one input, at the present values.
+        """Return the present partial derivatives of outputs with respect to one input.
 
         Args:
             outputs: Names of scalar outputs or derivatives, or of elements of arrays.
@@ -330,7 +344,7 @@ class Component(Protocol):
         current_time: ctypes.c_double,  # noqa: ARG002
         step_size: float,  # noqa: ARG002
     ) -> Sequence[PreparedCall] | None:
-        """Return `set_inputs`, `do_step` and `get_outputs` of one step as prepared calls, in step mode.
+        """Return `set_inputs`, `do_step` and `get_outputs` of one step as prepared calls.
 
         Called before the first step, and again before a step of another size.
 

@@ -174,7 +174,7 @@ def abbreviate_names(names: Iterable[str], limit: int = 8) -> str:
 
 
 def join_alternatives(names: Iterable[str]) -> str:
-    """Return the name of the component a failure is attributed to, or "one of ..." if several are possible.
+    """Return the name of the component that failed, or "one of ..." if several are possible.
 
     >>> join_alternatives(["uav"]), join_alternatives(["uav", "usv"])
     ('uav', 'one of uav, usv')
@@ -244,15 +244,15 @@ def pattern_hint(pattern: str, valid: Iterable[str]) -> str:
 
 
 def near_or_valid_names(name: str, valid: Iterable[str]) -> str:
-    """Return a hint like `did_you_mean`, but if there are many names and none is similar, their parts before the first dot.
+    """Return a hint like `did_you_mean`, or the valid names if none is similar.
 
-    >>> near_or_valid_names("speed.value", [f"{name}.{i}" for name in ("landing", "path") for i in range(8)])
+    Of many names only the parts before the first dot are listed.
+
+    >>> near_or_valid_names("speed.x", [f"{n}.{i}" for n in ("landing", "path") for i in range(8)])
     '; valid: landing.*, path.*'
     """
     names = tuple(valid)
-    parts = (
-        first + dot.replace(".", ".*") for first, dot, _ in (each.partition(".") for each in names)
-    )
+    parts = [re.sub(r"\..*", ".*", name) for name in names]
     return did_you_mean(name, names) or (f"; valid: {abbreviate_names(parts, 12)}" if names else "")
 
 
@@ -330,7 +330,7 @@ _BUNDLE = _PACKAGE / "_bundle"
 
 
 def innermost_user_line(frames: Iterable[tuple[str, int | None]]) -> str:
-    """Return "file:line" of the first frame in a file that belongs to no library, or "" if there is none.
+    """Return "file:line" of the first frame in a file of no library; "" if there is none.
 
     The standard library, installed packages and cosim are libraries.
 
@@ -341,7 +341,7 @@ def innermost_user_line(frames: Iterable[tuple[str, int | None]]) -> str:
 
 
 def is_cosim_file(file: str) -> bool:
-    """Return whether a file belongs to the package `cosim`, without the shipped vehicles and controllers."""
+    """Return whether a file belongs to `cosim` itself, not to shipped vehicles and controllers."""
     return Path(file).is_relative_to(_PACKAGE) and not Path(file).is_relative_to(_BUNDLE)
 
 

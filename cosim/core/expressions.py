@@ -1,7 +1,7 @@
-"""Expressions of named values, such as `landing.lateral_error + 0.1 * max(motors.max_speed - 400, 0)`.
+"""Expressions of named values, such as `landing.error + 0.1 * max(motors.max_speed - 400, 0)`.
 
-They consist of numbers, names, `+ - * / **`, parentheses and a few functions. Conditions also compare and combine with `and`,
-`or` and `not`. Python's `eval` is never used.
+They consist of numbers, names, `+ - * / **`, parentheses and a few functions. Conditions also
+compare and combine with `and`, `or` and `not`. Python's `eval` is never used.
 """
 
 from __future__ import annotations

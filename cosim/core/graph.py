@@ -10,7 +10,12 @@ T = TypeVar("T", bound=Hashable)
 
 
 def strong_components(successors: Mapping[T, Iterable[T]]) -> list[list[T]]:
-    """Return the strongly connected components in reverse topological order, by Tarjan's algorithm without recursion.
+    """Return the strongly connected components in reverse topological order.
+
+    Tarjan's algorithm (1972) without recursion: a depth-first search numbers the nodes (`index`).
+    `low` is the smallest number that a node reaches through its subtree and one edge back to a node on
+    the stack.
+    A node with low == index is the first one of its component, which lies above it on the stack.
 
     Args:
         successors: Successors of every node; nodes that are not keys are ignored.
@@ -64,16 +69,19 @@ def ordered_groups(predecessors: Mapping[T, Iterable[T]]) -> list[list[T]]:
     """
     position = {node: i for i, node in enumerate(predecessors)}
     groups = [sorted(group, key=position.__getitem__) for group in strong_components(predecessors)]
-    number = {node: k for k, group in enumerate(groups) for node in group}
-    needed = [
-        {number[p] for node in group for p in predecessors[node] if p in number} - {k}
-        for k, group in enumerate(groups)
-    ]
+    number: dict[T, int] = {}
+    for k, group in enumerate(groups):
+        number |= dict.fromkeys(group, k)
     followers: list[list[int]] = [[] for _ in groups]
-    for k, others in enumerate(needed):
-        for other in others:
+    waiting = []
+    for k, group in enumerate(groups):
+        needed = set()
+        for node in group:
+            needed |= {number[p] for p in predecessors[node] if p in number}
+        needed.discard(k)
+        for other in needed:
             followers[other].append(k)
-    waiting = [len(others) for others in needed]
+        waiting.append(len(needed))
     ready = [(position[groups[k][0]], k) for k, count in enumerate(waiting) if not count]
     heapify(ready)
     result = []

@@ -25,7 +25,7 @@ def decode_object(value: dict[str, Any]) -> Any:
 
 
 def parse_object(text: str | bytes) -> dict[str, Any]:
-    """Return the JSON object in a text that a program has written, but another one may have changed.
+    """Return the JSON object in a text of a program that another one may have changed.
 
     Raises:
         ValueError: The text is not JSON, nested too deeply, or not an object.

@@ -27,7 +27,7 @@ def root() -> Path:
 
 
 def shipped_names(pattern: str) -> list[str]:
-    """Return the names of the shipped files that match a pattern such as "scenarios/*.json", without suffixes."""
+    """Return names of shipped files by a pattern such as "scenarios/*.json", without suffixes."""
     return sorted(path.stem for path in root().glob(pattern))
 
 

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
+from itertools import chain
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -73,12 +74,15 @@ IterationMethod = Literal["fixed-point", "newton"]
 
 @dataclass(frozen=True, slots=True)
 class Iteration:
-    """Repetition of the stages of a group from the same state until their connected outputs converge.
+    """Repetition of the stages of a group from one state until their connected outputs converge.
 
     Attributes:
-        tolerance: A value y has converged if it differs from its previous value by at most tolerance * (1 + |y|).
-        max_rounds: Number of rounds without convergence after which the run fails; of Newton's method, number of its steps.
-        method: Fixed point, or Newton's method, whose Jacobian takes one more round for each connected output and step.
+        tolerance: A value y has converged if it differs from its previous value by at most
+            tolerance * (1 + |y|).
+        max_rounds: Number of rounds without convergence after which the run fails; of Newton's
+            method, number of its steps.
+        method: Fixed point, or Newton's method, whose Jacobian takes one more round for each
+            connected output and step.
     """
 
     tolerance: float
@@ -88,7 +92,7 @@ class Iteration:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Nested system: components with their own stages, which together are one member of an outer stage."""
+    """Nested system: components with their own stages, together one member of an outer stage."""
 
     name: str
     stages: tuple[Stage, ...]
@@ -111,7 +115,7 @@ def component_names(stages: Iterable[Stage]) -> Iterator[str]:
 
 def iterate_groups(stages: Iterable[Stage]) -> Iterator[Group]:
     """Yield all groups in the stages, also those inside groups."""
-    for member in (member for stage in stages for member in stage):
+    for member in chain.from_iterable(stages):
         if isinstance(member, Group):
             yield member
             yield from iterate_groups(member.stages)
@@ -150,14 +154,13 @@ class System:
     @cached_property
     def slots(self) -> Mapping[str, Mapping[str, VariableElement]]:
         """Every scalar of every component, by component name and scalar name."""
-        return {
-            name: {
-                slot: VariableElement(variable, i)
-                for variable in component.variables
-                for i, slot in enumerate(variable.scalar_names)
-            }
-            for name, component in self.components.items()
-        }
+        slots: dict[str, dict[str, VariableElement]] = {}
+        for name, component in self.components.items():
+            own = slots[name] = {}
+            for variable in component.variables:
+                for i, slot in enumerate(variable.scalar_names):
+                    own[slot] = VariableElement(variable, i)
+        return slots
 
     def find_element(self, endpoint: Endpoint) -> VariableElement:
         """Return the variable and element of an existing endpoint."""
@@ -293,13 +296,16 @@ class System:
 
 
 def _unlisted_member(name: str, listed: Collection[str]) -> str:
-    """Return the outermost system around a component, or itself, of which the stages contain no component."""
+    """Return the outermost system around a component whose stages contain no component.
+
+    The component itself if there is none.
+    """
     parts = name.split(".")
-    systems = (".".join(parts[:n]) for n in range(1, len(parts)))
-    return next(
-        (system for system in systems if not any(each.startswith(f"{system}.") for each in listed)),
-        name,
-    )
+    for n in range(1, len(parts)):
+        system = ".".join(parts[:n])
+        if not any(each.startswith(f"{system}.") for each in listed):
+            return system
+    return name
 
 
 INTEGER_TYPES = frozenset(

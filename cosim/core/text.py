@@ -61,9 +61,10 @@ def shorten(text: str, length: int = MAX_QUOTATION_LENGTH) -> str:
 
 
 def escape_control_characters(text: str, keep: str = "") -> str:
-    r"""Return a text with line breaks, control characters and direction marks as escape sequences such as \x1b.
+    r"""Return a text with control characters, also line breaks, as escape sequences such as \x1b.
 
-    These characters could move the cursor of a terminal, change its title, reorder text or fake lines of a log.
+    Marks of the direction of writing are escaped too. These characters could move the cursor of a
+    terminal, change its title, reorder text or fake lines of a log.
 
     Args:
         text: The text.

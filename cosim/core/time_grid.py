@@ -1,7 +1,7 @@
 """The time base of a run: exact communication points and their times in seconds.
 
 A communication point is an integer on a grid of exact fractions. Its time is rounded once, here and
-nowhere else: the executors receive their times from `TimeGrid.times`. Every recorded row contains its
+nowhere else: the executors receive their times from `TimeGrid.times`. Every recorded row has its
 time as float64, so that readers of rows need no grid. A row may also lie between two communication
 points, and several rows may have the same time (the limits before and after an event).
 """

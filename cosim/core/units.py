@@ -210,7 +210,7 @@ class Unit:
     offset: float = 0.0
 
     def converts_to(self, other: Unit) -> bool:
-        """Return whether both units measure the same quantity, or one of them an unknown quantity."""
+        """Return whether both units measure the same quantity, or one of them an unknown one."""
         return self.exponents == other.exponents or not (self.exponents and other.exponents)
 
     def conversion(self, other: Unit) -> tuple[float, float]:
@@ -259,7 +259,9 @@ def named_unit(text: str) -> Unit:
 
 
 def parse_unit(text: str) -> Unit:
-    """Parse a unit in Modelica syntax such as "kg.m/s2", "m.s-1" or "W/(m2.K)", or in a common spelling such as "N·m" or "-".
+    """Parse a unit in Modelica syntax or in a common spelling.
+
+    Modelica: "kg.m/s2", "m.s-1", "W/(m2.K)". Common spellings: "N·m", "-".
 
     Args:
         text: The unit; it becomes the name of the result.
@@ -379,9 +381,11 @@ def multiply_units(units: Iterable[tuple[str, int]]) -> str:
             name = symbol if _FACTOR_PATTERN.fullmatch(symbol) else f"({symbol})"
             powers[name] = powers.get(name, 0) + power * own
     powers.pop("1", None)
-    numerator, denominator = (
-        [f"{unit}{abs(n) if abs(n) > 1 else ''}" for unit, n in powers.items() if sign * n > 0]
-        for sign in (1, -1)
-    )
+    numerator: list[str] = []
+    denominator: list[str] = []
+    for unit, n in powers.items():
+        if n:
+            text = f"{unit}{abs(n)}" if abs(n) > 1 else unit
+            (numerator if n > 0 else denominator).append(text)
     divisor = f"({'.'.join(denominator)})" if len(denominator) > 1 else "".join(denominator)
     return (".".join(numerator) or "1") + (f"/{divisor}" if denominator else "")

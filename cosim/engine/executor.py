@@ -1,4 +1,4 @@
-"""Common base of the pure Python and the native executor, which step a plan with bit-identical results."""
+"""Common base of the pure Python and the native executor, whose results are bit-identical."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..process.float_mode import enabled_traps
 from ..process.journal import CALL_NUMBER, MARKER_SIZE, ROW_COUNT, STEP_COUNT
 from .initialization import initialize_components
 from .parallel import MEASURED_STEPS, ParallelSteps
-from .plan import Plan
+from .plan import Plan, all_transfers
 from .recorder import Recorder
 from .schedule import Schedule
 from .step_runner import FiniteCheck, StepRunner, Termination
@@ -52,9 +52,7 @@ class Executor(ABC):
         self.marker = np.zeros(MARKER_SIZE, np.int64) if marker is None else marker
         self._runner = StepRunner(self.marker)
         self._finite_check = FiniteCheck(plan, self._runner)
-        self._delay_lines = {
-            t: DelayLine(t) for phase in plan.all_phases for t in phase.transfers if t.delay
-        }
+        self._delay_lines = {t: DelayLine(t) for t in all_transfers(plan.all_phases) if t.delay}
         self._schedule = Schedule(plan, self._runner, self._delay_lines)
         self._parallel_steps = ParallelSteps(self._runner)
         #: conditions that end the simulation, and their state
@@ -72,7 +70,7 @@ class Executor(ABC):
 
     @property
     def termination(self) -> Termination | None:
-        """End of the simulation before the stop time, requested by a component or by a condition, if there was one."""
+        """End before the stop time that a component or a condition requested, if there was one."""
         return self._runner.termination
 
     @property
@@ -89,10 +87,11 @@ class Executor(ABC):
         return names[number] if 0 <= number < len(names) else ("the run", "moving values")
 
     def initialize(self) -> None:
-        """Bring the components from instantiated to step mode, and record the initial outputs as row 0.
+        """Bring the components from instantiated to step mode, and record the initial outputs.
 
         Raises:
-            ComponentError: a component failed, an algebraic loop did not converge, or a checked output is not finite.
+            ComponentError: a component failed, an algebraic loop did not converge, or a checked
+                output is not finite.
         """
         self._runner.current_time.value = self.plan.grid.time_at(0)
         initialize_components(self.plan)
@@ -108,7 +107,10 @@ class Executor(ABC):
         self._check_stop_conditions(0)
 
     def _check_stop_conditions(self, n: int) -> None:
-        """End the simulation at the recorded communication point `n` if a condition requires it and no component has done so."""
+        """End the simulation at communication point `n` if a condition requires it.
+
+        The point is recorded. A request of a component has priority.
+        """
         met = self.stop_conditions.check(n)
         if met and not self._runner.termination:
             self._runner.termination = Termination("", met.time, condition=met)
@@ -140,7 +142,7 @@ class Executor(ABC):
         self.marker[ROW_COUNT] = recorder.row_count
 
     def run(self, end: int) -> None:
-        """Run macro steps until communication point `end` is reached, or a component or a condition ends the simulation.
+        """Run macro steps until communication point `end`, or until the simulation ends before.
 
         Raises:
             ComponentError: a component failed, or a checked output is not finite.
@@ -177,12 +179,10 @@ class Executor(ABC):
 
         They run on one thread from now on.
         """
-        sizes = {
-            name: size
-            for begin, some in self.plan.shorter_steps.items()
-            if begin <= n
-            for name, size in some.items()
-        }
+        sizes: dict[str, float] = {}
+        for begin, some in self.plan.shorter_steps.items():
+            if begin <= n:
+                sizes |= some
         if sizes == self._schedule.shorter_steps:
             return
         self._parallel_steps.withdraw_candidates()
@@ -197,7 +197,7 @@ class Executor(ABC):
         self._rebuild()
 
     def save(self) -> ExecutorState:
-        """Return the numbers of steps and rows, the values of all inputs and outputs, and those in the delays."""
+        """Return the state: numbers of steps and rows, and the values of ports and delays."""
         self._rebuild()
         rings = [line.ring.copy() for line in self._delay_lines.values()]
         inputs, outputs = self.plan.inputs.copy_values(), self.plan.outputs.copy_values()
@@ -232,7 +232,7 @@ class Executor(ABC):
         self._prepare()
 
     def _native_transfers(self, _transfer: Transfer) -> int:
-        """Return how often C code has made a delayed transfer since the macro steps were prepared."""
+        """Return how often C code has made a delayed transfer since `_prepare`."""
         return 0
 
     def close(self) -> None:
@@ -245,7 +245,7 @@ class Executor(ABC):
         self._runner.restore_float_mode(step.step.name)
 
     def _restore_float_traps(self, n: int) -> None:
-        """Disable the floating-point traps that a step before communication point `n` has enabled."""
+        """Disable floating-point traps that a step before communication point `n` has enabled."""
         self._runner.restore_float_traps(self.plan.system.components, self.plan.grid.time_at(n))
 
     def _transfer_call(self, transfer: Transfer) -> TransferCall:

@@ -17,7 +17,7 @@ from ..core.system import FLOAT_TYPES, Endpoint, System
 from ..process.journal import calling_component
 from .iteration import exceeds_tolerance, solve_newton
 from .layout import ArrayPosition, Dtype
-from .plan import Plan
+from .plan import Plan, all_transfers
 from .transfer_plan import compile_transfer, connection_conversion
 
 
@@ -65,13 +65,9 @@ def copy_start_values(component: Component, ports: Ports) -> None:
 
     Inputs without a connection keep them.
     """
-    filled = dict.fromkeys(ports.arrays, 0)
-    for variable in ports.variables:
-        begin = filled[variable.dtype]
-        filled[variable.dtype] += len(variable.scalar_names)
-        if variable.derivative_of:
-            continue
-        ports.arrays[variable.dtype][begin : filled[variable.dtype]] = component.get(variable.name)
+    for variable, array, part in ports.elements():
+        if not variable.derivative_of:
+            array[part] = component.get(variable.name)
 
 
 #: sweeps beyond one per component before Newton's method, for loops that are contractions; relative
@@ -94,9 +90,7 @@ class InitialValues:
     def __init__(self, plan: Plan, time: float):
         self._plan, self._time = plan, time
         self._components = plan.system.components
-        self._transfers = [
-            compile_transfer(transfer) for phase in plan.all_phases for transfer in phase.transfers
-        ]
+        self._transfers = list(map(compile_transfer, all_transfers(plan.all_phases)))
         self._last_inputs: dict[str, PortValues] = {}
         self._last_outputs = {
             name: _copy_values(plan.outputs.ports[name]) for name in self._components
@@ -166,7 +160,7 @@ class InitialValues:
             transfer()
 
     def _sweep(self, tolerance: float) -> list[Endpoint]:
-        """Pass all outputs to inputs once, and return the outputs that have changed by more than the tolerance."""
+        """Pass all outputs to inputs once; return those that changed by more than the tolerance."""
         inputs, outputs = self._plan.inputs, self._plan.outputs.ports
         self._transfer()
         for (dtype, offset), value in self._held.items():
@@ -198,7 +192,6 @@ class InitialValues:
             self._components[name].get_outputs()
 
     # -- algebraic loops
-    # ---------------------------------------------------------------------------------------------------
 
     def _solve_loop(self, unknowns: _Unknowns) -> None:
         """Solve one loop; the inputs of all loops are held, and earlier loops have been solved."""
@@ -231,7 +224,7 @@ class InitialValues:
     def _column(
         self, unknowns: _Unknowns, i: int, values: np.ndarray, found: np.ndarray
     ) -> np.ndarray:
-        """Return the derivatives of the values that all inputs of a loop receive with respect to input `i`."""
+        """Return the derivatives of what all inputs receive with respect to input `i`."""
         name, position = unknowns.targets[i].component, unknowns.positions[i]
         if (exact := self._exact_column(unknowns, i)) is not None:
             return exact
@@ -274,7 +267,7 @@ class InitialValues:
 
 
 class _Unknowns:
-    """Inputs of an algebraic loop that are floating-point numbers, with their positions, tolerances and connections."""
+    """Floating-point inputs of an algebraic loop: positions, tolerances and connections."""
 
     def __init__(self, plan: Plan, loop: Sequence[Endpoint]):
         members = set(loop)
@@ -320,7 +313,7 @@ class _Unknowns:
         )
 
     def received(self, component: str, values: Mapping[str, float]) -> np.ndarray:
-        """Return the part of the inputs' values that is proportional to these outputs of a component."""
+        """Return the part of the inputs' values that is proportional to outputs of a component."""
         result = np.zeros(len(self.targets))
         for connection in self._connections:
             if connection.source.component == component and connection.target in self._rows:
@@ -330,7 +323,7 @@ class _Unknowns:
 
 
 def find_loops(system: System) -> list[list[Endpoint]]:
-    """Return the algebraic loops of the initialization, each with its inputs and outputs, upstream loops first.
+    """Return inputs and outputs of each algebraic loop of the initialization, upstream loops first.
 
     Outputs without declared dependencies may depend on every input of their component.
     """
@@ -356,7 +349,7 @@ def find_loops(system: System) -> list[list[Endpoint]]:
 def depends_on(
     system: System, dependencies: Mapping[str, frozenset[str]], output: Endpoint, end: Endpoint
 ) -> bool:
-    """Return whether an output may depend on an input, from the declared dependencies of variables."""
+    """Return whether an output may depend on an input by the declared dependencies."""
     known = dependencies.get(system.find_element(output).variable.name)
     return known is None or system.find_element(end).variable.name in known
 
@@ -374,12 +367,10 @@ def _changed_scalars(
     changed = {
         dtype: iter(_changed_elements(old[dtype], new[dtype], tolerance).tolist()) for dtype in new
     }
-    return [
-        name
-        for variable in ports.variables
-        for name in variable.scalar_names
-        if next(changed[variable.dtype])
-    ]
+    names: list[str] = []
+    for variable in ports.variables:
+        names += [name for name in variable.scalar_names if next(changed[variable.dtype])]
+    return names
 
 
 def _changed_elements(old: np.ndarray, new: np.ndarray, tolerance: float) -> np.ndarray:

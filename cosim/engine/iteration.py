@@ -1,7 +1,14 @@
-"""Iteration of macro steps by fixed point or Newton's method, with rollback of the components' states.
+"""Iteration of macro steps by fixed point or Newton's method, from the same saved state.
 
-All components of a loop step from the same state in every iteration. Their inputs are the outputs of the previous iteration, or
-of this iteration if the source is in an earlier stage. After convergence the inputs belong to the end of the macro step.
+All components of a loop step from the same state in every iteration. Their inputs are the outputs
+of the previous iteration, or of this iteration if the source is in an earlier stage. After
+convergence the inputs belong to the end of the macro step.
+
+Fixed point: repeat until no connected output changes by more than the tolerance. It converges if
+the loop is a contraction, such as for short steps. Newton: the unknowns are the connected outputs
+y; the residuals are the outputs G(y) of one repetition minus y. The Jacobian is formed by forward
+differences, so each step costs one repetition per unknown, but loops that are no contraction
+converge too. A step that does not reduce the residuals is halved (damped Newton).
 """
 
 from __future__ import annotations
@@ -9,6 +16,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from itertools import compress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -80,7 +88,7 @@ class FixedPointIteration:
             is_first = True
 
             def run_round() -> list[np.ndarray]:
-                """Repeat the macro step, and return the masks of the outputs that have changed by it."""
+                """Repeat the macro step, and return the masks of the outputs that it changed."""
                 nonlocal is_first
                 if not is_first:
                     discard_requests()
@@ -128,9 +136,8 @@ class FixedPointIteration:
             iteration = self._loop.iteration
             start = read()
             if len(floats) < len(self._coupled_outputs):
-                residuals(
-                    start
-                )  # the differences of the Jacobian need the integers and texts that belong to these values
+                # the Jacobian's differences need the integers and texts that belong to these values
+                residuals(start)
             jacobian = difference_jacobian(residuals)
             write(
                 solve_newton(
@@ -171,11 +178,9 @@ class FixedPointIteration:
         return exceeds_tolerance(old, new, self._loop.iteration.tolerance)
 
     def _divergence_message(self, changed: Sequence[np.ndarray]) -> str:
-        changing = [
-            name
-            for names, mask in zip(self._output_names, changed, strict=True)
-            for name in np.array(names)[mask]
-        ]
+        changing: list[str] = []
+        for names, mask in zip(self._output_names, changed, strict=True):
+            changing += compress(names, mask)
         iteration = self._loop.iteration
         return (
             f"no convergence after {iteration.max_rounds} iterations; outputs that still change "

@@ -9,6 +9,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,22 +76,16 @@ def build_layout(variables: Mapping[str, Sequence[Variable]]) -> Layout:
     for name, owned in variables.items():
         for dtype in {variable.dtype: None for variable in owned}:
             first = lengths[dtype]
-            for scalar in (
-                scalar
-                for variable in owned
-                if variable.dtype == dtype
-                for scalar in variable.scalar_names
-            ):
+            scalars = chain.from_iterable(v.scalar_names for v in owned if v.dtype == dtype)
+            for scalar in scalars:
                 positions[Endpoint(name, scalar)] = ArrayPosition(dtype, lengths[dtype])
                 lengths[dtype] += 1
             parts[name][dtype] = slice(first, lengths[dtype])
     buffer, arrays = _allocate(lengths)
-    ports = {
-        name: Ports(
-            tuple(owned), {dtype: arrays[dtype][part] for dtype, part in parts[name].items()}
-        )
-        for name, owned in variables.items()
-    }
+    ports = {}
+    for name, owned in variables.items():
+        own_arrays = {dtype: arrays[dtype][part] for dtype, part in parts[name].items()}
+        ports[name] = Ports(tuple(owned), own_arrays)
     return Layout(buffer, arrays, ports, positions)
 
 

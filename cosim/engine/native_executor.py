@@ -86,7 +86,6 @@ class NativeExecutor(Executor):
         )
 
     # -- adding operations
-    # ---------------------------------------------------------------------------------------------
 
     def _add_transfer(self, transfer: Transfer) -> None:
         if transfer.source.dtype.hasobject:
@@ -159,7 +158,6 @@ class NativeExecutor(Executor):
             )
 
     # -- running
-    # -------------------------------------------------------------------------------------------------------
 
     def record_between(self, time: Fraction | float) -> None:
         """Record the present outputs as a row at a time that is not a communication point."""
@@ -198,7 +196,7 @@ class NativeExecutor(Executor):
         self.marker[ROW_COUNT] = self.recorder.row_count
 
     def _on_status(self, number: int, status: int) -> int:
-        """Handle a status of call `number` that is not a success, and return how the simulation continues."""
+        """Handle a status of call `number` that is no success; return how the run continues."""
         if status == _native.NOT_FINITE:
             self._finite_check.run()
             return _native.CONTINUE

@@ -11,6 +11,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..core.component import SUCCESS_STATUSES, NativeDoStep, PreparedCall
@@ -34,7 +35,7 @@ MIN_PARALLEL_DURATION = 100e-6
 
 @dataclass(eq=False)
 class ParallelGroup:
-    """Steps of one stage that may run at the same time, and their partition onto threads once it is chosen."""
+    """Steps of one stage that may run at the same time, and their partition onto threads."""
 
     steps: Sequence[ScheduledStep]
     parallel: Parallel
@@ -61,15 +62,15 @@ class ParallelGroup:
             processors: number of available processors.
         """
         groups = self.exclusive_groups()
-        costs = {
-            key: sum(durations[step.first_call] for step in group) for key, group in groups.items()
-        }
-        long_groups = [
-            key
-            for key, cost in costs.items()
-            if self.parallel is True or cost >= MIN_PARALLEL_DURATION
-        ]
-        count = min(max(2, processors) if self.parallel is True else processors, len(long_groups))
+        costs: dict[object, float] = defaultdict(float)
+        for key, group in groups.items():
+            for step in group:
+                costs[key] += durations[step.first_call]
+        if self.parallel is True:
+            count = min(max(2, processors), len(groups))
+        else:
+            long = sum(cost >= MIN_PARALLEL_DURATION for cost in costs.values())
+            count = min(processors, long)
         self.partitions = _balance_load(groups, costs, count) if count > 1 else ()
 
 
@@ -97,7 +98,7 @@ def releases_gil(step: ScheduledStep) -> bool:
 
 
 class ParallelSteps:
-    """The stages that may step on threads, and the decision which of them do, taken after the first macro steps."""
+    """Stages that may step on threads, and the decision after the first steps which of them do."""
 
     def __init__(self, runner: StepRunner):
         self._runner = runner
@@ -112,7 +113,7 @@ class ParallelSteps:
         return bool(self._candidates)
 
     def find_candidates(self, phases: Sequence[Phase], schedule: Schedule) -> None:
-        """Find the phases with independent steps in C, and schedule one parallel step for each of these phases."""
+        """Schedule one parallel step for each phase with independent steps in C."""
         for index, (phase, steps) in enumerate(zip(phases, schedule.phases, strict=True)):
             group = ParallelGroup([step for step in steps if releases_gil(step)], phase.parallel)
             if phase.parallel and len(group.exclusive_groups()) > 1:
@@ -122,7 +123,7 @@ class ParallelSteps:
                 self._candidates[index] = group, schedule.add_step(step, [call])
 
     def decide(self, schedule: Schedule, durations: Mapping[int, float]) -> None:
-        """Replace the steps of each phase that pays off by their parallel step, and create the threads.
+        """Replace the steps of each phase that pays off by their parallel step; create the threads.
 
         Args:
             schedule: its phases are changed in place.
@@ -144,18 +145,15 @@ class ParallelSteps:
             self._threads = ThreadPool(largest - 1)
 
     def withdraw_candidates(self) -> None:
-        """Let the steps of all phases run one after another, unless it has been decided that they do not."""
+        """Let the steps of all phases run one after another, unless it was decided otherwise."""
         self._candidates = {}
 
     def _run_group(self, group: ParallelGroup) -> int:
         assert self._threads is not None
         run_partition = partial(run_due, n=self._runner.completed_steps)
         with calling_several_components():
-            failures = [
-                failure
-                for found in self._threads.map(run_partition, group.partitions)
-                for failure in found
-            ]
+            found = self._threads.map(run_partition, group.partitions)
+        failures = chain.from_iterable(found)
         for failure in sorted(failures, key=lambda failure: failure.step.first_call):
             if failure.status is None:
                 self._runner.restore_float_mode(failure.step.step.name)
@@ -187,8 +185,9 @@ class StepFailure(NamedTuple):
 
 
 def run_due(steps: Sequence[ScheduledStep], n: int) -> list[StepFailure]:
-    """Run the steps that are due in macro step `n`, in order, and return those that stopped early."""
-    return [failure for step in steps if n % step.step.divisor == 0 for failure in _run_calls(step)]
+    """Run the steps that are due in macro step `n`, in order; return those that stopped early."""
+    due = (step for step in steps if n % step.step.divisor == 0)
+    return list(chain.from_iterable(map(_run_calls, due)))
 
 
 def _run_calls(step: ScheduledStep) -> Iterator[StepFailure]:

@@ -97,12 +97,12 @@ class PerturbingExecutor(PythonExecutor):
         self._prepare()
 
     def set_values(self, values: np.ndarray) -> None:
-        """Add the rows of `values`, shape (steps, channels), in the next macro steps, and nothing after the last row."""
+        """Add a row of `values`, shape (steps, channels), in each of the next macro steps."""
         self._values, self._begin = values, self.completed_steps
         self.observed, self._last_row = np.zeros(values.shape), np.zeros(values.shape[1])
 
     def _last_phases(self) -> dict[Any, int]:
-        """Return for each connected input, by its position, the last phase in which it is transferred."""
+        """Return the last phase in which each connected input is transferred, by its position."""
         return {
             (transfer.target.dtype, offset): number
             for number, phase in enumerate(self.plan.phases)

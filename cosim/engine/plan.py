@@ -11,6 +11,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import NamedTuple
 
 from ..core.component import Causality, Component, PreparedCall, Variable
@@ -75,7 +76,7 @@ class Loop:
     @property
     def components(self) -> dict[str, Component]:
         """Components of the loop, by name."""
-        return {step.name: step.component for phase in self.all_phases for step in phase.steps}
+        return {step.name: step.component for step in all_steps(self.all_phases)}
 
     @property
     def all_phases(self) -> Iterator[Phase]:
@@ -114,7 +115,10 @@ class Plan:
 
     @property
     def end_warning(self) -> str:
-        """Message that the run ends before the stop time, because a component cannot make a shorter step; "" if it does not."""
+        """Message that the run ends before the stop time; "" if it does not.
+
+        Some components cannot make a shorter last step.
+        """
         end, stop = self.grid.end, self.settings.stop_time
         if end == stop:
             return ""
@@ -129,9 +133,9 @@ class Plan:
 
     @cached_property
     def shorter_steps(self) -> Mapping[int, Mapping[str, float]]:
-        """Sizes (s) of the last steps that are shorter, by the macro step in which they begin and by component."""
+        """Sizes (s) of shorter last steps, by macro step in which they begin and by component."""
         found: dict[int, dict[str, float]] = defaultdict(dict)
-        for step in (step for phase in self.all_phases for step in phase.steps if self.grid.count):
+        for step in all_steps(self.all_phases) if self.grid.count else ():
             begin = (self.grid.count - 1) // step.divisor * step.divisor
             rest = self.grid.end - self.grid.start - begin * self.grid.step
             if rest < step.divisor * self.grid.step:
@@ -157,7 +161,7 @@ def compile_plan(system: System, settings: Settings) -> Plan:
     """
     grid = check_run(system, settings)
     phases = list(_split_into_phases(system))
-    connections = [connection for phase in phases for connection in _connections_of(phase)]
+    connections = list(chain.from_iterable(map(_connections_of, phases)))
     inputs = _input_layout(system, connections)
     outputs = _output_layout(
         system, connections, settings.columns.values(), _extrapolated_sources(system, phases, set())
@@ -174,7 +178,7 @@ def compile_plan(system: System, settings: Settings) -> Plan:
     def make_loop(group: Group | None, inner: Sequence[_PhaseDraft]) -> Loop | None:
         if not group or not group.iteration:
             return None
-        connections = [connection for phase in inner for connection in _connections_of(phase)]
+        connections = list(chain.from_iterable(map(_connections_of, inner)))
         stepped.update(component_names(group.stages))  # a repeated step knows the values at its end
         return Loop(group.name, group.iteration, tuple(map(make_phase, inner)), connections)
 
@@ -190,6 +194,16 @@ def _events_by_point(events: Iterable[Event], grid: TimeGrid) -> dict[int, list[
     for event in events:
         points[grid.index(event.time)].append(event)
     return points
+
+
+def all_steps(phases: Iterable[Phase]) -> Iterator[Step]:
+    """Yield the steps of phases, in order."""
+    return chain.from_iterable(phase.steps for phase in phases)
+
+
+def all_transfers(phases: Iterable[Phase]) -> Iterator[Transfer]:
+    """Yield the transfers of phases, in order."""
+    return chain.from_iterable(phase.transfers for phase in phases)
 
 
 def _flatten_phases(phases: Iterable[Phase]) -> Iterator[Phase]:
@@ -247,10 +261,12 @@ def _phases_of_stages(
     for stage in stages:
         groups = [member for member in stage if isinstance(member, Group)]
         members = [frozenset(component_names(group.stages)) for group in groups]
-        own_group = {name: names for names in members for name in names}
-        connections = [
-            connection for name in component_names([stage]) for connection in incoming.get(name, ())
-        ]
+        own_group: dict[str, frozenset[str]] = {}
+        for names in members:
+            own_group |= dict.fromkeys(names, names)
+        connections: list[Connection] = []
+        for name in component_names([stage]):
+            connections += incoming.get(name, ())
         yield _PhaseDraft(
             [
                 c
@@ -270,7 +286,7 @@ def _phases_of_stages(
 
 
 def _input_layout(system: System, connections: Iterable[Connection]) -> Layout:
-    """Lay out the inputs in the order of the transfers, so that the targets of a transfer are consecutive."""
+    """Lay out the inputs in the order of transfers, so that the targets of each are consecutive."""
     connections = list(connections)
     terms = [
         Variable(term_endpoint(connection).scalar) for connection in connections if connection.term
@@ -286,7 +302,7 @@ def _input_layout(system: System, connections: Iterable[Connection]) -> Layout:
 def _extrapolated_sources(
     system: System, phases: Iterable[_PhaseDraft], stepped: set[str]
 ) -> Iterator[Endpoint]:
-    """Yield the outputs whose slopes are given, and are used by linear connections before their components step."""
+    """Yield outputs with given slopes that linear connections use before their component steps."""
     for phase in phases:
         for source in (c.source for c in phase.connections if c.interpolation == "linear"):
             if (
@@ -304,7 +320,10 @@ def _output_layout(
     recorded: Iterable[Endpoint],
     sloped: Iterable[Endpoint],
 ) -> Layout:
-    """Lay out the connected and recorded outputs, in the order in which they are first read, and the slopes of some of them."""
+    """Lay out the connected and recorded outputs in the order of their first use.
+
+    With the slopes of some of them.
+    """
     return _layout_of_endpoints(
         system,
         (*(connection.source for connection in connections), *recorded),
@@ -351,10 +370,9 @@ def _group_by_type(variables: Sequence[Variable]) -> list[Variable]:
 
     Enumerations count as integers.
     """
-    types = [f"Int{8 * v.dtype.itemsize}" if v.type == "Enumeration" else v.type for v in variables]
-    return [
-        variable
-        for kind in dict.fromkeys(types)
-        for variable, type_ in zip(variables, types, strict=True)
-        if type_ == kind
-    ]
+    groups: dict[str, list[Variable]] = defaultdict(list)
+    for variable in variables:
+        is_enumeration = variable.type == "Enumeration"
+        kind = f"Int{8 * variable.dtype.itemsize}" if is_enumeration else variable.type
+        groups[kind].append(variable)
+    return list(chain.from_iterable(groups.values()))

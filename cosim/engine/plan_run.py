@@ -125,7 +125,7 @@ class PlanRun:
         self._states = ComponentStates(self._components, self.accessing)
 
     def initialize(self) -> None:
-        """Bring the components to step mode, record the initial outputs and apply the events at the start time.
+        """Bring the components to step mode, record the initial outputs and apply the first events.
 
         Raises:
             ComponentError: a component failed.
@@ -146,7 +146,7 @@ class PlanRun:
         self.advance(0)
 
     def advance(self, end: int, observers: Sequence[Observer] = ()) -> None:
-        """Run macro steps until communication point `end` is reached or a component requests termination.
+        """Run macro steps until communication point `end`, or until a component requests the end.
 
         Args:
             end: number of a communication point, at most that of the stop time.
@@ -206,7 +206,7 @@ class PlanRun:
                 self._apply_events(stop)
 
     def _run_in_single_steps(self, stop: int) -> None:
-        """Run until communication point `stop` or until a component requests termination, with hook and pacer at every step."""
+        """Run until communication point `stop` or a request to end, with hook and pacer."""
         for n in range(self.executor.completed_steps + 1, stop + 1):
             if self._step_hook:
                 self._step_hook(n - 1)
@@ -243,7 +243,7 @@ class PlanRun:
 
     @contextmanager
     def accessing(self, component: str, function: str) -> Iterator[None]:
-        """Protect the process from a component whose function is called between two steps in this block.
+        """Protect the process from a component that is called between two steps in this block.
 
         Raises:
             ComponentError: the component failed, which ends the simulation.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import compress, pairwise
+from itertools import chain, compress, pairwise
 from math import inf
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -38,7 +38,7 @@ class _CompiledPhase(NamedTuple):
 
 
 class _DueSteps:
-    """Iterable over the steps that are due in the current macro step, for a phase with several periods."""
+    """Iterable over the steps of a phase with several periods that are due now."""
 
     def __init__(
         self, steps: Sequence[Sequence[NumberedCall]], divisors: Sequence[int], marker: memoryview
@@ -69,7 +69,7 @@ class PythonExecutor(Executor):
     def _compile_phase(self, phase: Phase, steps: Sequence[ScheduledStep]) -> _CompiledPhase:
         divisors = [step.step.divisor for step in steps]
         views = [contiguous_views(transfer) for transfer in phase.transfers]
-        copies = [pair for pairs in views if pairs is not None for pair in pairs]
+        copies = list(chain.from_iterable(filter(None, views)))
         transfers = [
             self._transfer_call(t)
             for t, pairs in zip(phase.transfers, views, strict=True)
@@ -153,9 +153,10 @@ class PythonExecutor(Executor):
 
 
 def _exponent_bytes(floats: np.ndarray) -> tuple[Callable[[], bytes], slice]:
-    """Return a function that returns bytes, and the slice of these bytes with each float's sign and upper exponent bits.
+    """Return a function that returns bytes, and the slice with each float's upper exponent bits.
 
-    A slice that contains neither 0x7F nor 0xFF has finite floats only. One of them also occurs for very large finite floats.
+    A slice that contains neither 0x7F nor 0xFF has finite floats only. One of them also occurs for
+    very large finite floats.
     """
     high_bytes = slice(
         floats.itemsize - 1 if sys.byteorder == "little" else 0, None, floats.itemsize

@@ -18,14 +18,21 @@ from ..core.errors import Problem
 from ..core.recording import Recording
 from ..core.text import count_noun
 from ..process.row_store import MAX_MEMORY_BYTES, open_row_store
-from ..process.run_files import ROWS_FILE, SIGNALS, TIME, TIME_SIZE, Column, RowLayout, RowsFile
+from ..process.run_files import (
+    ROWS_FILE,
+    SIGNALS,
+    TIME,
+    TIME_SIZE,
+    Column,
+    RowLayout,
+    RowsFile,
+    text_column,
+)
 from ..results.csv_files import BYTES_PER_NUMBER
 from .layout import ArrayPosition
 from .plan import Plan
 from .transfer_plan import MAX_SINGLE_COPIES
 
-#: size of an output buffer from which copying all of it is faster than copying values one by one
-MIN_BUFFER_BYTES = 64
 #: writes the current values into the row with this number
 RowWriter = Callable[[int], object]
 
@@ -41,8 +48,8 @@ class RowPart(NamedTuple):
 class Recorder:
     """Stores the values of the recorded outputs.
 
-    The signals of a row are a copy of the whole output buffer if it is not small and at least half
-    of it is recorded; otherwise a row contains only the recorded values. Strings and binaries are stored in memory,
+    The signals of a row are a copy of the whole output buffer if at least half of it is recorded;
+    otherwise a row contains only the recorded values. Strings and binaries are stored in memory,
     apart from the rows.
 
     Args:
@@ -66,7 +73,7 @@ class Recorder:
         )
         #: a row contains a copy of the whole output buffer
         recorded_bytes = sum(position.dtype.itemsize for position in numeric)
-        self.whole_buffer = 2 * recorded_bytes >= plan.outputs.buffer.nbytes >= MIN_BUFFER_BYTES
+        self.whole_buffer = 2 * recorded_bytes >= plan.outputs.buffer.nbytes > 0
         #: the parts of a row otherwise
         self.row_parts: Sequence[RowPart] = (
             () if self.whole_buffer else list(self._pack_row(numeric))
@@ -213,7 +220,7 @@ def _alignment_order(position: ArrayPosition) -> tuple[int, str, int]:
 
 
 def _buffer_writer(chunk: memoryview, buffer: memoryview, size: int, first: int) -> RowWriter:
-    """Return a function that copies the buffer into a row of the chunk that begins at row `first`."""
+    """Return a function that copies the buffer to a row of the chunk that begins at row `first`."""
     length = len(buffer)
 
     def write(row: int) -> None:
@@ -248,21 +255,19 @@ class _StringColumn:
 
     def __init__(self, values: np.ndarray, index: int):
         self._values, self._index = values, index
-        self._changes: list[tuple[int, Any]] = []
+        #: values with the row in which each begins
+        self.changes: list[tuple[int, Any]] = []
 
     def append(self, row: int) -> None:
         value = self._values[self._index]
-        if not self._changes or self._changes[-1][1] != value:
-            self._changes.append((row, value))
+        if not self.changes or self.changes[-1][1] != value:
+            self.changes.append((row, value))
 
     def rewind(self, rows: int) -> None:
-        self._changes = [change for change in self._changes if change[0] < rows]
+        self.changes = [change for change in self.changes if change[0] < rows]
 
     def column(self, rows: int) -> np.ndarray:
-        values = np.empty(rows, object)
-        for row, value in self._changes:
-            values[row:] = value
-        return values
+        return text_column(self.changes, rows)
 
 
 class SavingRecorder(Recorder):
@@ -276,12 +281,7 @@ class SavingRecorder(Recorder):
     def __init__(self, plan: Plan, folder: Path):
         super().__init__(plan, folder / ROWS_FILE)
         self._file = RowsFile(folder, self.layout)
-        self._strings: dict[str, tuple[np.ndarray, int]] = {}
-        for _, name in self.layout.texts:
-            position = self._positions[name]
-            self._strings[name] = plan.outputs.arrays[position.dtype], position.offset
-        self._saved_strings: dict[str, Any] = dict.fromkeys(self._strings, "")
-        if self._strings:
+        if self._string_columns:
             self._file.write_texts(0, {})
             self._string_writers.append(self._save_changed_strings)
 
@@ -291,11 +291,11 @@ class SavingRecorder(Recorder):
 
     def _save_changed_strings(self, row: int) -> None:
         changed = {}
-        for name, (array, index) in self._strings.items():
-            if array[index] != self._saved_strings[name]:
-                changed[name] = array[index]
+        for name, column in self._string_columns.items():
+            begin, value = column.changes[-1]
+            if begin == row:
+                changed[name] = value
         if changed:
-            self._saved_strings |= changed
             self._file.write_texts(row, changed)
 
 

@@ -1,4 +1,4 @@
-"""Checks of a system and its settings before a run, and the variables that can be set during a run."""
+"""Checks of a system and its settings before a run, and of variables to set during a run."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ MIN_ULPS_PER_STEP = 100
 
 
 def check_run(system: System, settings: Settings) -> TimeGrid:
-    """Check that the system can be simulated with these settings, and return its communication points.
+    """Check that the system can be simulated with these settings; return its communication points.
 
-    The last one is the stop time if the components whose steps do not end there can make a shorter last step. Otherwise it is the
-    last point before it at which the steps of all components end.
+    The last one is the stop time if the components whose steps do not end there can make a shorter
+    last step. Otherwise it is the last point before it at which the steps of all components end.
 
     Raises:
-        InputError: it cannot. The `subject` of each problem names the setting: ("stop_time",), ("components", NAME, "period"),
-            ("events", "time"), ...
+        InputError: it cannot. The `subject` of each problem names the setting: ("stop_time",),
+            ("components", NAME, "period"), ("events", "time"), ...
     """
     problems = [*system.problems(), *_find_event_problems(system, settings.events)]
     problems += _find_real_time_problems(settings)
@@ -62,7 +62,7 @@ def check_run(system: System, settings: Settings) -> TimeGrid:
 
 
 def components_with_fixed_steps(system: System, settings: Settings) -> list[str]:
-    """Return the components whose last step would have to be shorter to end at the stop time, but cannot."""
+    """Return the components whose last step cannot be short enough to end at the stop time."""
     duration = settings.stop_time - settings.start_time
     return [
         name
@@ -87,7 +87,7 @@ def _find_real_time_problems(settings: Settings) -> Iterator[Problem]:
 
 
 def _find_resolution_problems(settings: Settings) -> Iterator[Problem]:
-    """Yield a problem if the step size is too small for the resolution of float64 times, which components receive."""
+    """Yield a problem if the step size is too small for the resolution of times in float64."""
     largest = max(abs(float(settings.start_time)), abs(float(settings.stop_time)))
     if settings.step_size < MIN_ULPS_PER_STEP * Fraction(ulp(largest)):
         step = f"a step of {float(settings.step_size)!r} s is not resolved at t = {largest!r} s"
@@ -142,7 +142,10 @@ def _find_event_time_problems(events: Iterable[Event], grid: TimeGrid) -> Iterat
 
 
 def _fitting_step(system: System, settings: Settings) -> Fraction:
-    """Return the step size, or one that divides all intervals if it is longer than a period or divides none of several."""
+    """Return a step size that divides all intervals, if the given one does not fit them.
+
+    The given one if it is at most as long as all periods and divides one of several.
+    """
     step, intervals = settings.step_size, _intervals(system, settings)
     if step <= 0:
         return step
@@ -215,7 +218,7 @@ def _find_period_problems(system: System, settings: Settings, grid: TimeGrid) ->
 
 
 def _find_delay_problems(system: System) -> Iterator[Problem]:
-    """Yield a problem if the delays store too many values, located at the connections that store most of them."""
+    """Yield a problem if delays store too many values, at the connections that store most."""
     stored: Counter[str] = Counter()
     for connection in system.connections:
         stored[connection.where] += connection.delay

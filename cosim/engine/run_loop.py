@@ -56,7 +56,7 @@ def simulate(
 def simulating(
     plan: Plan, observers: Sequence[Observer] = (), step_hook: StepHook | None = None
 ) -> Iterator[SimulationOutcome]:
-    """Simulate a plan like `simulate`, but terminate and free its components only at the end of the block.
+    """Simulate a plan like `simulate`, but free its components only at the end of the block.
 
     The block can save the outcome first, so that a crash in terminate or free cannot lose it.
 

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from ..core.component import PreparedCall
 from .iteration import FixedPointIteration, IterationPhase
-from .plan import Loop, Phase, Plan, ScheduledStep, Step
+from .plan import Loop, Phase, Plan, ScheduledStep, Step, all_transfers
 from .step_runner import StepRunner
 from .transfer_plan import DelayLine, Transfer, TransferCall, compile_transfer
 
@@ -71,9 +71,7 @@ class Schedule:
         of all inner loops.
         """
         phases = [self._iteration_phase(phase) for phase in loop.phases]
-        linear = [
-            t for phase in loop.all_phases for t in phase.transfers if t.slope_indices is not None
-        ]
+        linear = [t for t in all_transfers(loop.all_phases) if t.slope_indices is not None]
         prepare = [self._delay_lines[transfer].fill for transfer in linear] if is_outermost else []
         iteration = FixedPointIteration(
             loop, self._plan.outputs, phases, prepare, self._runner.run_step

@@ -23,7 +23,7 @@ from ..core.errors import (
 from ..process import float_mode
 from ..process.journal import CALL_NUMBER, ROW_COUNT, STEP_COUNT, STEP_TIME
 from .iteration import FixedPointIteration
-from .plan import Plan, ScheduledStep, Step
+from .plan import Plan, ScheduledStep, Step, all_steps
 from .stop_conditions import MetCondition
 
 #: status of a call into Python during which a component requested termination; no FMU can return it
@@ -160,7 +160,7 @@ class StepRunner:
         self._float_mode.restore(component, "the step", self.current_time.value)
 
     def restore_float_traps(self, components: Iterable[str], end: float) -> None:
-        """Disable the floating-point traps that one of the components has enabled before time `end` (s)."""
+        """Disable floating-point traps that one of the components has enabled before `end` (s)."""
         self._float_mode.restore(join_alternatives(components), "a step", end, "before")
 
 
@@ -184,13 +184,9 @@ class FiniteCheck:
             *dict.fromkeys(connection.source for connection in connections),
             *(recorded if policy == "fail" else ()),
         ]
-        order = {
-            step.name: k
-            for k, step in enumerate(step for phase in plan.all_phases for step in phase.steps)
-        }
-        checked.sort(
-            key=lambda endpoint: order.get(endpoint.component, 0)
-        )  # the cause before those that depend on it
+        order = {step.name: k for k, step in enumerate(all_steps(plan.all_phases))}
+        # the cause before those that depend on it
+        checked.sort(key=lambda endpoint: order.get(endpoint.component, 0))
         positions = [
             (endpoint, plan.outputs.positions[endpoint], reader_of.get(endpoint))
             for endpoint in dict.fromkeys(checked)

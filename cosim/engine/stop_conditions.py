@@ -77,7 +77,7 @@ class StopConditions:
         return lambda: float(values[index])
 
     def instructions(self) -> Iterator[list[tuple[Instruction, np.ndarray]]]:
-        """Yield for each condition its instructions in C, each with an array that begins with the value that it loads."""
+        """Yield each condition's instructions in C, with arrays that begin with their values."""
         for condition in self._conditions:
             yield [
                 (each, self._values_from(each.name))
@@ -92,7 +92,7 @@ class StopConditions:
         return self._plan.outputs.arrays[position.dtype][position.offset :]
 
     def check(self, n: int) -> MetCondition | None:
-        """Evaluate all conditions at the recorded communication point `n`, and return the one that ends the simulation."""
+        """Evaluate all conditions at communication point `n`; return the one that ends the run."""
         met = None
         for k, evaluate in enumerate(self._evaluators):
             value = evaluate()
@@ -215,15 +215,15 @@ def _combine(operation: str, parts: Sequence[Sequence[Instruction]]) -> list[Ins
 
 def _compile_call(name: str, arguments: Sequence[Sequence[Instruction]]) -> list[Instruction]:
     first, *others = arguments
+    code = [*first]
     if name == "log":  # to a base: the quotient of two logarithms
-        quotient = [Instruction("DIVIDE")] * len(others)
-        return [
-            *first,
-            Instruction("LOG"),
-            *(part for each in others for part in (*each, Instruction("LOG"))),
-            *quotient,
-        ]
+        code.append(Instruction("LOG"))
+        for each in others:
+            code += [*each, Instruction("LOG"), Instruction("DIVIDE")]
+        return code
     operation = Instruction(name.upper())
     if not others:
         return [*first, operation]
-    return [*first, *(part for each in others for part in (*each, operation))]
+    for each in others:
+        code += [*each, operation]
+    return code

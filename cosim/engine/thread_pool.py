@@ -51,7 +51,7 @@ class ThreadPool:
 
 
 def _wait_for(futures: Sequence[Future[Result]]) -> None:
-    """Wait until all calls have ended, and only then raise a KeyboardInterrupt that was received while waiting."""
+    """Wait until all calls have ended; raise a KeyboardInterrupt received meanwhile only then."""
     interrupt: KeyboardInterrupt | None = None
     while not all(future.done() for future in futures):
         try:

@@ -76,7 +76,7 @@ def slope_variable(variable: Variable) -> Variable:
 
 
 def slope_endpoint(system: System, end: Endpoint) -> Endpoint:
-    """Return the name of the time derivative of an input or output in the layout of the inputs or outputs."""
+    """Return the name of the time derivative of an input or output in its layout."""
     variable, element = system.find_element(end)
     return Endpoint(end.component, slope_variable(variable).scalar_names[element])
 
@@ -96,7 +96,7 @@ def unit_conversion(source: Variable, target: Variable) -> tuple[float, float]:
 
 
 def connection_conversion(system: System, connection: Connection) -> tuple[float, float]:
-    """Return (factor, offset) of the conversion of units, followed by the connection's own gain and offset."""
+    """Return (factor, offset) of the conversion of units and the connection's gain and offset."""
     ends = (connection.source, connection.target)
     factor, offset = unit_conversion(*(system.find_element(end).variable for end in ends))
     return connection.gain * factor, connection.gain * offset + connection.offset
@@ -177,20 +177,18 @@ class TransferPlanner:
         )
 
     def _sums(self, targets: Iterable[Endpoint]) -> Iterator[Transfer]:
-        """Yield the transfers that add up the terms of these inputs, grouped by dtype and number of terms."""
+        """Yield transfers that add up the terms of these inputs, by dtype and number of terms."""
         groups: dict[tuple[Dtype, int], list[Endpoint]] = defaultdict(list)
         for target in targets:
             groups[self._inputs.positions[target].dtype, len(self._terms[target])].append(target)
         for (dtype, _), group in groups.items():
-            terms = [
-                [self._inputs.positions[term_endpoint(term)] for term in self._terms[target]]
-                for target in group
-            ]
+            offsets = []
+            for target in group:
+                sources = [self._inputs.positions[term_endpoint(t)] for t in self._terms[target]]
+                offsets.append([position.offset for position in sources])
             yield Transfer(
-                self._inputs.arrays[terms[0][0].dtype],
-                np.ascontiguousarray(
-                    np.transpose([[position.offset for position in row] for row in terms]), np.intp
-                ),
+                self._inputs.arrays[sources[0].dtype],
+                np.ascontiguousarray(np.transpose(offsets), np.intp),
                 self._inputs.arrays[dtype],
                 np.array([self._inputs.positions[target].offset for target in group], np.intp),
             )
@@ -221,13 +219,15 @@ class TransferPlanner:
                 yield self._linear_transfer(rest, interpolates)
 
     def _slope_transfer(self, connections: Sequence[Connection]) -> Transfer:
-        ends = [
-            [slope_endpoint(self._system, end) for end in (c.source, c.target)] for c in connections
-        ]
+        sources = [slope_endpoint(self._system, c.source) for c in connections]
+        targets = [slope_endpoint(self._system, c.target) for c in connections]
         factor = np.array([self._conversion(connection)[0] for connection in connections])
-        sources = [self._outputs.positions[source] for source, _ in ends]
         return self._make_transfer(
-            sources, [self._inputs.positions[t] for _, t in ends], 0, factor, np.zeros_like(factor)
+            [self._outputs.positions[source] for source in sources],
+            [self._inputs.positions[target] for target in targets],
+            0,
+            factor,
+            np.zeros_like(factor),
         )
 
     def _linear_transfer(self, connections: Sequence[Connection], interpolates: bool) -> Transfer:
@@ -345,7 +345,7 @@ def _contiguous_view(array: np.ndarray, indices: np.ndarray) -> memoryview:
 
 
 def compile_transfer(transfer: Transfer) -> TransferCall:
-    """Return a function that performs the transfer without its delay, with as few memory allocations as possible."""
+    """Return a function that performs the transfer without its delay, and allocates little."""
     if transfer.term_count:
         return partial(_add_terms, transfer)
     first, count = int(transfer.target_indices[0]), len(transfer.target_indices)
@@ -433,12 +433,15 @@ class DelayLine:
         self.ring[:], self._oldest = ring, 0
 
     def align_ring(self, transfers: int) -> None:
-        """Rotate the ring so that the oldest row comes first, after `transfers` transfers made by the native executor."""
+        """Rotate the ring so that the oldest row comes first.
+
+        The native executor has made `transfers` transfers.
+        """
         self.ring[:] = np.roll(self.ring, -(self._oldest + transfers), 0)
         self._oldest = 0
 
     def deliver_line(self) -> None:
-        """Deliver values and slopes of a linear transfer, without storing the current source values."""
+        """Deliver values and slopes of a linear transfer; do not store the present source values."""
         transfer, (before,) = self.transfer, self.ring
         now = transfer.source[transfer.source_indices]
         slopes = (now - before) / self.step_size

@@ -1,1 +1,1 @@
-"""Export of FMUs from Modelica models, CasADi equations, Python classes and C sources (`cosim build`)."""
+"""Export of FMUs from Modelica, CasADi equations, Python classes and C (`cosim build`)."""

@@ -1,4 +1,4 @@
-"""Export of all sources to `fmus/` (`cosim build`) and the manifest of sources, FMUs and tool versions."""
+"""Export of all sources to `fmus/` (`cosim build`), and its manifest."""
 
 from __future__ import annotations
 
@@ -204,7 +204,6 @@ def _select_sources(sources: Sequence[Path] | None, root: Path) -> list[Source]:
 
 
 # -- the manifest
-# --------------------------------------------------------------------------------------------------------------
 
 
 def read_manifest(root: Path) -> dict[str, Any]:

@@ -165,7 +165,7 @@ def _difference_of_results(first: Future[list[Trace]], second: Future[list[Trace
 
 
 def first_difference(first: Trace, second: Trace) -> str:
-    """Return a description of the first difference between two traces, or "" if they agree within the tolerances."""
+    """Return the first difference between two traces, or "" if they agree within the tolerances."""
     first_variables = {variable.name: variable for variable in first.variables}
     second_variables = {variable.name: variable for variable in second.variables}
     for name in sorted(first_variables.keys() | second_variables.keys()):

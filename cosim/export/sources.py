@@ -161,7 +161,10 @@ def find_sources(root: Path) -> list[Source]:
 
 
 def vehicle_files(root: Path) -> dict[str, Path]:
-    """Return the shipped vehicle files by the names of their vehicles, also those of vehicles with equations of their own."""
+    """Return the shipped vehicle files by name.
+
+    Vehicles with equations of their own are included.
+    """
     templates = {
         path.stem: path
         for path in root.glob("plant_src/vehicles/*/*.json")
@@ -217,7 +220,7 @@ def classify_source(path: Path, model: str | None = None) -> Source:
 
 
 def split_reference(reference: str) -> tuple[Path, str | None]:
-    """Return the file of a source, and the model or class that "file.mo:Model" or "file.py:Class" names in it.
+    """Return the file, and the model or class of "file.mo:Model" or "file.py:Class".
 
     Raises:
         InputError: There is a colon without a name after it.
@@ -235,7 +238,7 @@ def split_reference(reference: str) -> tuple[Path, str | None]:
 
 
 def resolve_source_path(path: Path) -> Path:
-    """Return the model description if `path` is the folder of a C controller, else `path` itself."""
+    """Return the model description in the folder of a C controller, else `path` itself."""
     return path / DESCRIPTION_FILE if (path / DESCRIPTION_FILE).is_file() else path
 
 

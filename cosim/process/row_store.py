@@ -1,4 +1,4 @@
-"""Storage of recorded rows in memory, or in a file that survives a crash and may be larger than memory."""
+"""Storage of recorded rows in memory, or in a file that may be larger than memory."""
 
 from __future__ import annotations
 
@@ -104,7 +104,9 @@ class FileRowStore(RowStore):
 
 
 class FileMapping:
-    """Part of a file mapped to memory without an open descriptor, which foreign code in this process could truncate.
+    """Part of a file mapped to memory without an open descriptor.
+
+    Foreign code in this process could truncate the file by its descriptor.
 
     `mmap.mmap` would keep a descriptor open. `np.asarray` returns the bytes as an array.
     """
@@ -153,7 +155,7 @@ def map_rows(
 
 
 def open_row_store(dtype: np.dtype[Any], expected: int, path: Path | None) -> RowStore:
-    """Return a store in the file at `path`, else in memory, or in an unnamed temporary file if it exceeds `MAX_MEMORY_BYTES`.
+    """Return a store in the file at `path`, in memory, or in a temporary file if it is large.
 
     Args:
         dtype: Structured dtype of a row.

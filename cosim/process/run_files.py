@@ -16,10 +16,11 @@ import json
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..core.json_values import decode_object, encode_value, parse_object
 from .journal import current_journal
@@ -137,10 +138,19 @@ class RowsFile:
         with (self._folder / TEXTS_FILE).open("ab", buffering=0) as file:
             file.write(json.dumps([row, texts], default=encode_value).encode() + b"\n")
 
-    def open_texts(self) -> TextReader:
-        """Open the string signals."""
-        names = [name for _, name in self.layout.texts]
-        return TextReader((self._folder / TEXTS_FILE).open("rb") if names else io.BytesIO(), names)
+    def read_texts(self, rows: int) -> list[np.ndarray]:
+        """Return the string signals of the first `rows` rows, each of shape (rows,).
+
+        A line that is incomplete, or that foreign code has damaged, changes nothing.
+        """
+        changes: dict[str, list[tuple[int, Any]]] = {name: [] for _, name in self.layout.texts}
+        file = self._folder / TEXTS_FILE
+        for line in file.read_bytes().splitlines() if changes else ():
+            with suppress(ValueError, TypeError, AttributeError, RecursionError):
+                row, texts = json.loads(line, object_hook=decode_object)
+                for name in texts.keys() & changes:
+                    changes[name].append((int(row), texts[name]))
+        return [text_column(each, rows) for each in changes.values()]
 
     def count_rows(self) -> int:
         """Return the number of complete rows in a file whose writer was killed.
@@ -169,8 +179,6 @@ class RowsFile:
 
     def recording(self, rows: int) -> Recording:
         """Read the first `rows` rows, or fewer if foreign code has truncated their file."""
-        import numpy as np
-
         from ..core.recording import Recording
 
         layout, rows = self.layout, min(rows, self._readable_rows())
@@ -179,57 +187,21 @@ class RowsFile:
         for column in layout.columns:
             values = data[SIGNALS][column.name]
             numbers.append(values.astype(bool) if column.boolean else values)
-        texts = np.empty((rows, len(layout.texts)), object)
-        with closing(self.open_texts()) as reader:
-            for row in range(rows if layout.texts else 0):
-                texts[row] = reader.read_row(row)
         units = layout.merge_columns([c.unit for c in layout.columns], [""] * len(layout.texts))
-        signals = dict(zip(layout.names, layout.merge_columns(numbers, texts.T), strict=True))
+        signals = dict(
+            zip(layout.names, layout.merge_columns(numbers, self.read_texts(rows)), strict=True)
+        )
         return Recording(data[TIME], signals, dict(zip(layout.names, units, strict=True)))
 
 
-class TextReader:
-    """Reader of the string signals of an unfinished run."""
+def text_column(changes: Sequence[tuple[int, Any]], rows: int) -> np.ndarray:
+    """Return a string signal, shape (rows,), from its values and the rows in which each begins."""
+    import numpy as np
 
-    def __init__(self, file: IO[bytes], names: Sequence[str]):
-        self._file, self._names = file, names
-        self._rewind()
-
-    def _rewind(self) -> None:
-        """Return to the first row."""
-        self._file.seek(0)
-        self._row, self._pending_change = -1, (-1, dict[str, Any]())
-        self._texts: dict[str, Any] = dict.fromkeys(self._names, "")
-
-    def close(self) -> None:
-        """Close the file of the strings."""
-        self._file.close()
-
-    def read_row(self, number: int) -> list[Any]:
-        """Return the string signals of a row; fast if rows are read in ascending order."""
-        if number < self._row:
-            self._rewind()
-        self._row = number
-        while self._pending_change[0] <= number:
-            self._texts |= self._pending_change[1]
-            line = self._file.readline()
-            if not line.endswith(b"\n"):  # end of file, or a line that is being written
-                self._file.seek(-len(line), os.SEEK_CUR)
-                self._pending_change = (-1, {})
-                break
-            self._pending_change = self._parse_change(line)
-        return list(self._texts.values())
-
-    def _parse_change(self, line: bytes) -> tuple[int, dict[str, Any]]:
-        """Return the row of a change and its texts.
-
-        A line that foreign code has damaged changes nothing.
-        """
-        try:
-            row, texts = json.loads(line, object_hook=decode_object)
-            return int(row), {name: text for name, text in texts.items() if name in self._texts}
-        except (ValueError, TypeError, AttributeError, RecursionError):
-            return self._pending_change[0], {}
+    values = np.full(rows, "", object)
+    for (begin, value), (end, _) in pairwise([*changes, (rows, "")]):
+        values[begin:end] = value
+    return values
 
 
 def recover_recording(folder: Path | None, rows: int) -> Recording:

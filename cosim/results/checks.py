@@ -6,7 +6,7 @@ import logging
 import math
 import operator
 from collections.abc import Callable, Iterable, Mapping
-from itertools import islice
+from itertools import chain, islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,7 +50,7 @@ class CheckOutcome(NamedTuple):
         return self.text({})
 
     def text(self, units: Mapping[str, str]) -> str:
-        """Return value and limits in words, such as "roll.value is 0.46 rad, expected at most 0.35 rad".
+        """Return value and limits, such as "roll.value is 0.46 rad, expected at most 0.35 rad".
 
         Args:
             units: Units of KPIs by name; "", "1" and missing ones are not written.
@@ -87,7 +87,8 @@ def evaluate_checks(
             checks.
     """
     checks = list(checks)
-    if problems := [problem for check in checks for problem in _find_check_problems(kpis, check)]:
+    problems = list(chain.from_iterable(_find_check_problems(kpis, check) for check in checks))
+    if problems:
         raise InputError(problems)
     return [_evaluate_check(check, kpis[check["kpi"]]) for check in checks]
 
@@ -95,7 +96,7 @@ def evaluate_checks(
 def evaluate_all_checks(
     kpis: Mapping[str, Number], checks: Iterable[Mapping[str, Any]]
 ) -> list[CheckOutcome]:
-    """Evaluate checks like `evaluate_checks`, but a missing KPI fails its check with the value NaN."""
+    """Evaluate checks; unlike in `evaluate_checks`, a missing KPI fails with the value NaN."""
     checks = list(checks)
     return evaluate_checks({**{check["kpi"]: math.nan for check in checks}, **kpis}, checks)
 
@@ -158,7 +159,7 @@ def warn_non_finite(recording: Recording) -> dict[str, float]:
 
 
 def _first_rows(recording: Recording) -> dict[str, int]:
-    """Return the first row that is not finite by name of the signal, in ascending order of the rows."""
+    """Return the first row that is not finite by name of the signal, in ascending order."""
     floats = {
         name: values for name, values in recording.columns.items() if values.dtype.kind == "f"
     }

@@ -123,11 +123,12 @@ def match_tolerances(tolerances: Mapping[str, Tolerance], names: list[str]) -> d
         (re.compile(".*".join(map(re.escape, pattern.split("*")))), tolerance)
         for pattern, tolerance in tolerances.items()
     ]
-    matching = (
-        (name, [tolerance for pattern, tolerance in patterns if pattern.fullmatch(name)])
-        for name in names
-    )
-    return {name: matches[-1] for name, matches in matching if matches}
+    matching = {}
+    for name in names:
+        for pattern, tolerance in patterns:
+            if pattern.fullmatch(name):
+                matching[name] = tolerance
+    return matching
 
 
 class Comparer:
@@ -162,7 +163,7 @@ class Comparer:
         return self.points.interpolate_result(result), reference
 
     def tube(self, name: str, tolerance: Tolerance, rows: slice | np.ndarray = slice(None)) -> Tube:
-        """Return the tube around a signal of the reference, at all `points` or at those selected by `rows`."""
+        """Return the tube around a signal of the reference at all `points`, or at some rows."""
         return self._tube(
             self.series(name)[1], self._half_width(name, tolerance), tolerance.time, rows
         )
@@ -183,7 +184,7 @@ class Comparer:
 
     @cached_property
     def _spacing(self) -> float:
-        """Distance between points (s) if they are the evenly spaced rows of the reference, else 0."""
+        """Distance between points (s) if they are evenly spaced rows of the reference, else 0."""
         return (
             uniform_spacing(self.points.time)
             if np.array_equal(self.points.time, self._reference.time)
@@ -194,7 +195,7 @@ class Comparer:
         return tolerance.half_width(_to_floats(self._reference, name))
 
     def is_outside(self, name: str, tolerance: Tolerance) -> np.ndarray:
-        """Return at each of `points` whether the result is outside the tube around a signal, shape (points,)."""
+        """Return whether the result is outside the tube around a signal, shape (points,)."""
         values, reference = self.series(name)
         tube = self._tube(reference, self._half_width(name, tolerance), tolerance.time)
         return (values < tube.lower) | (values > tube.upper)
@@ -296,7 +297,7 @@ class Comparer:
     def _tube_violation(
         self, name: str, tube: Tube, values: np.ndarray, distance: np.ndarray, half_width: float
     ) -> Verdict:
-        """Return the verdict on a signal whose `distance` outside the tube is positive at some points."""
+        """Return the verdict on a signal with a positive `distance` from the tube at some points."""
         outside = np.flatnonzero(distance > 0)
         row, worst, unit = outside[0], int(distance.argmax()), self._unit_suffix(name)
         time, excess = float(tube.time[row]), _relative_excess(distance[worst], half_width)
@@ -327,7 +328,7 @@ class Comparer:
         return Verdict(name, text, time, excess)
 
     def _is_discrete(self, name: str) -> bool:
-        """Return whether all values of both runs are integers without a unit, Booleans for example."""
+        """Return whether all values of both runs are integers without unit, such as Booleans."""
         runs = (_to_floats(self._result, name), _to_floats(self._reference, name))
         return not self._unit_suffix(name) and all(
             np.array_equal(values, np.round(values)) for values in runs
@@ -351,7 +352,9 @@ def _sample_and_hold(run: Result, name: str, time: np.ndarray) -> np.ndarray:
 
 
 def _relative_excess(distance: float, half_width: float) -> float:
-    return float(distance) / half_width if half_width > 0 else math.inf if distance > 0 else 0.0
+    if half_width > 0:
+        return float(distance) / half_width
+    return math.inf if distance > 0 else 0.0
 
 
 #: largest number of failures that `Comparison.shortened` lists
@@ -386,7 +389,7 @@ class Verdict(NamedTuple):
 
 @dataclass(frozen=True)
 class Comparison:
-    """Verdicts on the whole comparison and on patterns, followed by those on all signals in the order of the reference."""
+    """Verdicts on the comparison and on patterns, then on signals in the reference's order."""
 
     verdicts: tuple[Verdict, ...]
 

@@ -38,7 +38,7 @@ def iterate_chunks(arrays: Sequence[np.ndarray], size: int) -> Iterator[slice]:
         arrays: Arrays of shape (rows,).
         size: Maximum number of rows of a slice.
     """
-    files = {id(file): file for array in arrays if (file := _memory_map(array))}
+    files = {id(file): file for file in map(_memory_map, arrays) if file}
     for first in range(0, len(arrays[0]), size):
         yield slice(first, first + size)
         for file in files.values():

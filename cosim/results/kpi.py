@@ -254,11 +254,10 @@ def kpi_units(
         The unit of each name; "" if none is declared, or if it depends on the unknown unit of a
         signal.
     """
-    declared = {
-        f"{name}.{key}": _resolve_unit(unit, arguments, signal_units)
-        for name, function, arguments in kpis
-        for key, unit in declared_units(function).items()
-    }
+    declared = {}
+    for name, function, arguments in kpis:
+        for key, unit in declared_units(function).items():
+            declared[f"{name}.{key}"] = _resolve_unit(unit, arguments, signal_units)
     return {name: declared.get(name.partition("[")[0], "") for name in names}
 
 
@@ -268,15 +267,11 @@ def _resolve_unit(
     """Replace the names of arguments in a declared unit by the units of their signals."""
     if "{" not in declared:
         return declared
-    factors = [
-        (
-            signal_units.get(str(arguments.get(match[1])), "")
-            if (match := _PLACEHOLDER.fullmatch(symbol))
-            else symbol,
-            power,
-        )
-        for symbol, power in split_unit(declared)
-    ]
+    factors = []
+    for symbol, power in split_unit(declared):
+        match = _PLACEHOLDER.fullmatch(symbol)
+        unit = signal_units.get(str(arguments.get(match[1])), "") if match else symbol
+        factors.append((unit, power))
     if not all(unit for unit, _ in factors):
         return ""
     (unit, power), *others = factors
@@ -286,22 +281,21 @@ def _resolve_unit(
 def kpi_notes(
     kpis: Mapping[str, Number], taken: Iterable[tuple[str, Mapping[str, Any]]] = ()
 ) -> list[str]:
-    """Return lines that give the reason of each value that is missing, and the signals that KPIs took.
+    """Return lines with the reason of each missing value, and with the signals that KPIs took.
 
     Args:
         kpis: Values by name.
-        taken: Names of KPIs and of their signals by argument, such as ("descent", {"mode": "uav.mode"}).
+        taken: Names of KPIs and signals by argument, such as ("descent", {"mode": "uav.mode"}).
     """
     names_of: dict[str, list[str]] = {}
     for name, value in kpis.items():
         if isinstance(value, NoValue):
             names_of.setdefault(value.reason, []).append(name)
-    reasons = [f"{abbreviate_names(names, 3)}: {reason}" for reason, names in names_of.items()]
-    return reasons + [
-        f'{name} is computed from the signal {signal} (argument "{argument}")'
-        for name, signals in taken
-        for argument, signal in signals.items()
-    ]
+    notes = [f"{abbreviate_names(names, 3)}: {reason}" for reason, names in names_of.items()]
+    for name, signals in taken:
+        for argument, signal in signals.items():
+            notes.append(f'{name} is computed from the signal {signal} (argument "{argument}")')
+    return notes
 
 
 def kpi_senses(
@@ -313,10 +307,9 @@ def kpi_senses(
         kpis: Name, function and arguments of each KPI.
         names: Names of values, such as "landing.time".
     """
-    declared = {
-        f"{name}.{key}": sense
-        for name, function, _ in kpis
-        for key, sense in getattr(function, "better", {}).items()
-    }
+    declared = {}
+    for name, function, _ in kpis:
+        for key, sense in getattr(function, "better", {}).items():
+            declared[f"{name}.{key}"] = sense
     senses = {name: declared.get(name.partition("[")[0]) for name in names}
     return {name: sense for name, sense in senses.items() if sense}

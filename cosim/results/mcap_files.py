@@ -19,6 +19,7 @@ import json
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import accumulate, chain
 from pathlib import Path
 from typing import Any
 
@@ -105,7 +106,8 @@ def _log_poses(recording: Recording, times: list[int], context: Any) -> None:
     if not names:
         return
     channel = FrameTransformsChannel("/tf", context=context)
-    columns = [recording.columns[f"{name}.{signal}"] for name in names for signal in _POSE_SIGNALS]
+    signals = chain.from_iterable(map(_pose_signals, names))
+    columns = [recording.columns[signal] for signal in signals]
     for now, row in zip(times, _iterate_rows(columns), strict=True):
         stamp = Timestamp(*divmod(now, 10**9))
         numbers = (
@@ -132,11 +134,12 @@ def find_poses(recording: Recording) -> list[str]:
         for name in recording.columns
         if name.endswith(".position.x")
     )
-    return [
-        prefix
-        for prefix in prefixes
-        if all(f"{prefix}.{signal}" in recording.columns for signal in _POSE_SIGNALS)
-    ]
+    recorded = recording.columns.keys()
+    return [each for each in prefixes if recorded >= set(_pose_signals(each))]
+
+
+def _pose_signals(name: str) -> list[str]:
+    return [f"{name}.{signal}" for signal in _POSE_SIGNALS]
 
 
 def _log_signals(recording: Recording, times: list[int], context: Any) -> None:
@@ -168,7 +171,9 @@ def _build_tree(names: list[str]) -> SignalTree:
 
     A name that is also the prefix of others gets the part `value` appended.
     """
-    inner = {name[:i] for name in names for i, letter in enumerate(name) if letter == "."}
+    inner: set[str] = set()
+    for name in names:
+        inner.update(accumulate(name.split(".")[:-1], "{}.{}".format))
     tree: SignalTree = {}
     for column, name in enumerate(names):
         *path, leaf = [*name.split("."), *(["value"] if name in inner or "." not in name else [])]

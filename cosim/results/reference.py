@@ -32,7 +32,7 @@ _PROVENANCE_KEYS = ("versions", "machine", "sha256")
 
 
 def decimate(result: Result, tolerances: Mapping[str, Tolerance]) -> Result:
-    """Select few rows that describe a run within a fraction of the tolerances, among them the first and the last one.
+    """Select few rows, with the first and last one, that describe a run within its tolerances.
 
     Args:
         result: The run.
@@ -42,7 +42,8 @@ def decimate(result: Result, tolerances: Mapping[str, Tolerance]) -> Result:
         The matching signals at the selected rows, rounded to about a hundredth of their tolerances.
 
     Raises:
-        CheckError: The run cannot be a reference: a pattern matches no signal, or a value is not finite.
+        CheckError: The run cannot be a reference: a pattern matches no signal, or a value is not
+            finite.
     """
     if unmatched := [pattern for pattern in tolerances if not result.signals(pattern)]:
         texts = (
@@ -96,7 +97,7 @@ def _select_rows(rows: np.ndarray, result: Result) -> Result:
 def _find_rows_outside(
     result: Result, reference: Result, tolerances: Mapping[str, Tolerance], rows: np.ndarray
 ) -> np.ndarray:
-    """Return the rows of the result outside a fraction of the tolerances around a reference that consists of `rows`."""
+    """Return the rows outside a fraction of the tolerances around a reference made of `rows`."""
     comparer = Comparer(result, reference)
     last = np.searchsorted(reference.time, result.time, "right") - 1
     outside = np.zeros(len(result.time), dtype=bool)
@@ -139,7 +140,10 @@ def write_reference(result: Result, path: Path, tolerances: Mapping[str, Toleran
 
 
 def _provenance(metadata: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the versions, machine and hashes of `run.json`, with one hash for the Python files of a folder with many of them."""
+    """Return versions, machine and hashes of `run.json`.
+
+    The Python files of a folder with many of them have one hash.
+    """
     hashes = metadata.get("sha256") or {}
     counts = Counter(filter(None, map(_modules_of, hashes)))
     return {
@@ -159,7 +163,7 @@ def _modules_of(name: str) -> str:
 
 
 def _join_modules(hashes: Mapping[str, str], joined: Collection[str]) -> dict[str, str]:
-    """Return the hashes of files, with one for all Python files that one of the patterns `joined` stands for."""
+    """Return the hashes of files, with one for all Python files of each pattern in `joined`."""
     lines: dict[str, list[str]] = defaultdict(list)
     for name in sorted(hashes):
         lines[pattern if (pattern := _modules_of(name)) in joined else name].append(
@@ -174,12 +178,13 @@ def _join_modules(hashes: Mapping[str, str], joined: Collection[str]) -> dict[st
 def describe_provenance_changes(
     before: Mapping[str, Any], after: Mapping[str, Any], shown: Callable[[str], str] = str
 ) -> list[str]:
-    """Return the differences between the provenance of a reference and of a run, such as "numpy 2.1 -> 2.2".
+    """Return the differences of provenance from a reference to a run, such as "numpy 2.1 -> 2.2".
 
     Args:
         before: Provenance of the reference, as in its JSON file.
         after: Metadata of the run.
-        shown: Function that returns how a file is named, from its path relative to the scenario's folder or "cosim:...".
+        shown: Function that returns how a file is named, from its path relative to the scenario's
+            folder or "cosim:...".
     """
     changes = []
     for key in _PROVENANCE_KEYS:

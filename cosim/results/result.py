@@ -126,7 +126,7 @@ class Result:
 
     @property
     def termination(self) -> str:
-        """Sentence that names the component or the condition that ended the run before the stop time; "" if none did."""
+        """Sentence that names what ended the run before the stop time; "" if nothing did."""
         terminated_by = self.metadata.get("terminated_by")
         return describe_termination(**terminated_by) if terminated_by else ""
 
@@ -226,7 +226,7 @@ class Result:
         return Presentation.plot(self, signals)
 
     def _repr_html_(self) -> str:
-        """Return the table of KPIs and the report with figures and replay, for a cell of a notebook."""
+        """Return the table of KPIs and the report with figures and replay, for a notebook."""
         return Presentation.html(self)
 
     def write(self, folder: str | Path) -> None:

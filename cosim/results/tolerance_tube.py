@@ -57,7 +57,11 @@ class Tube(NamedTuple):
 
 
 class TimeWindows:
-    """Windows [t - reach, t + reach] of a reference around each of `times` (s), clipped to its span."""
+    """Windows [t - reach, t + reach] around each of `times` (s), clipped to the reference's span.
+
+    The extremes of the reference in a window are those of the rows inside and of the interpolated
+    values at its two edges, because the reference is a polyline.
+    """
 
     def __init__(self, reference_time: np.ndarray, times: np.ndarray, reach: float):
         reach += time_tolerance(reference_time)
@@ -68,7 +72,7 @@ class TimeWindows:
         self._levels = list(_doubling_levels(first, last))
 
     def extremes(self, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the smallest and the largest value of the reference in each window, each of shape (times,)."""
+        """Return the smallest and the largest value in each window, each of shape (times,)."""
         begins, ends = (edge.values(reference) for edge in self._edges)
         lower = self._include_rows(np.minimum, np.minimum(begins, ends), reference)
         return lower, self._include_rows(np.maximum, np.maximum(begins, ends), reference)
@@ -91,7 +95,10 @@ class TimeWindows:
 def _doubling_levels(
     first: np.ndarray, last: np.ndarray
 ) -> Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield for each k the windows of 2**k to 2**(k+1) - 1 rows, and the indices where their first and last 2**k rows begin."""
+    """Yield for each k the windows of 2**k to 2**(k+1) - 1 rows.
+
+    With the indices at which their first and their last 2**k rows begin.
+    """
     exponents = np.frexp(np.maximum(last - first + 1, 0))[1] - 1
     for k in range(int(exponents.max(initial=-1)) + 1):
         windows = np.flatnonzero(exponents == k)
@@ -128,7 +135,7 @@ class UniformTimeWindows:
         self._fraction = max(rows - self._count, 0.0)
 
     def extremes(self, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the smallest and the largest value of the reference in each window, each of shape (rows,)."""
+        """Return the smallest and the largest value in each window, each of shape (rows,)."""
         count, rows = self._count, len(reference)
         padded = np.pad(reference, count + 1, mode="edge")
         begins = self._interpolate_edges(padded[1:], padded, rows)
@@ -147,7 +154,7 @@ class UniformTimeWindows:
 
 
 def _sliding_extreme(choose: np.ufunc, row: np.ndarray, width: int) -> np.ndarray:
-    """Return the extreme of each `width` neighbouring rows, computed from pieces of doubling width."""
+    """Return the extreme of each `width` neighbouring rows, from pieces of doubling width."""
     length, rows = 1, len(row) - width + 1
     while 2 * length <= width:
         row = choose(row[:-length], row[length:])

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import Any
 
 from ..core.size_limits import (
@@ -57,15 +58,13 @@ class SystemFile:
 
         A connection to an input port counts once for each of its readers.
         """
-        targets = [spec.target for _, spec in accepted(self.spec.connections) for _ in spec.sources]
-        if isinstance(self.spec, ScenarioSpec):
-            targets += [
-                name
-                for _, spec in accepted(self.spec.inputs)
-                for names in spec.to.values()
-                for name in names
-            ]
-        own = sum(self._count_targets(target, CONNECTION_PORTS) for target in targets)
+        own = 0
+        for _, spec in accepted(self.spec.connections):
+            own += len(spec.sources) * self._count_targets(spec.target, CONNECTION_PORTS)
+        profiles = self.spec.inputs if isinstance(self.spec, ScenarioSpec) else ()
+        for _, profile in accepted(profiles):
+            for name in chain.from_iterable(profile.to.values()):
+                own += self._count_targets(name, CONNECTION_PORTS)
         return (
             own
             + len(ports_of(self.spec).outputs)
@@ -117,14 +116,13 @@ class SystemFile:
     @cached_property
     def _targets_by_port(self) -> Mapping[Sequence[str], Mapping[str, int]]:
         """Number of inner names of every port, by kinds and port."""
-        return {
-            kinds: {
-                port: sum(self._count_targets(inner, kinds) for inner in names)
-                for kind in kinds
-                for port, names in getattr(ports_of(self.spec), kind).items()
-            }
-            for kinds in (CONNECTION_PORTS, VALUE_PORTS)
-        }
+        counts: dict[Sequence[str], dict[str, int]] = {}
+        for kinds in (CONNECTION_PORTS, VALUE_PORTS):
+            own = counts[kinds] = {}
+            for kind in kinds:
+                for port, names in getattr(ports_of(self.spec), kind).items():
+                    own[port] = sum(self._count_targets(inner, kinds) for inner in names)
+        return counts
 
 
 def check_expanded_size(file: SystemFile) -> None:

@@ -206,16 +206,12 @@ def _removals_with_components(
     result: dict[str, Any] = {}
     connections, own = inherited.get("connections"), changes.get("connections", {})
     if isinstance(connections, list) and isinstance(own, dict):
-        ends = [
-            each
-            for each in connections
-            if isinstance(each, dict) and isinstance(each.get("to"), str)
-        ]
-        gone = {
-            each["to"]: change
-            for each in ends
-            if (change := _without_sources(each, removed)) != each
-        }
+        gone: dict[str, Any] = {}
+        for each in connections:
+            if isinstance(each, dict) and isinstance(each.get("to"), str):
+                change = _without_sources(each, removed)
+                if change != each:
+                    gone[each["to"]] = change
         result["connections"] = {**gone, **own}
     for key, entry in (("algorithm", "stages"), ("record", "signals")):
         old, own = inherited.get(key), changes.get(key, {})

@@ -62,15 +62,13 @@ class FunctionResolver:
         Functions with problems, and optional functions that lack a signal or value, are replaced by
         placeholders.
         """
-        functions = {
-            kind: [
-                self._resolve_function(kind, i, each) if each is not INVALID else INVALID
-                for i, each in enumerate(specs)
-            ]
-            for kind, specs in (("kpis", spec.kpis), ("figures", spec.figures))
-        }
+        resolved: dict[str, Any] = {}
+        for kind in ("kpis", "figures"):
+            functions = resolved[kind] = list(getattr(spec, kind))
+            for i, function in accepted(functions):
+                functions[i] = self._resolve_function(kind, i, function)
         scene = spec.scene and self._resolve_arguments(spec.scene, self.problems, "scene")
-        return spec.model_copy(update={**functions, "scene": scene})
+        return spec.model_copy(update={**resolved, "scene": scene})
 
     def _resolve_function(self, kind: str, i: int, spec: FunctionSpec) -> Any:
         if definition_problem(spec, self.root.folder):
@@ -213,9 +211,6 @@ class FunctionResolver:
 
 def without_placeholders(spec: ScenarioSpec) -> ScenarioSpec:
     """Return a resolved scenario without the placeholders of functions."""
-    return spec.model_copy(
-        update={
-            kind: [each for _, each in accepted(getattr(spec, kind))]
-            for kind in ("kpis", "figures")
-        }
-    )
+    kpis = [each for _, each in accepted(spec.kpis)]
+    figures = [each for _, each in accepted(spec.figures)]
+    return spec.model_copy(update={"kpis": kpis, "figures": figures})

@@ -10,6 +10,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from importlib.util import find_spec
+from itertools import chain
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -95,8 +96,9 @@ def kpi_value_names(function: ast.FunctionDef) -> list[str]:
     Names in earlier `return` statements, such as those for runs without a landing, are included.
     """
     returned = [list(_dict_keys(value)) for value in _returned_expressions(function)]
-    known = returned and "" not in returned[-1]
-    return list(dict.fromkeys(key for keys in returned for key in keys if key)) if known else []
+    if not returned or "" in returned[-1]:
+        return []
+    return list(filter(None, dict.fromkeys(chain.from_iterable(returned))))
 
 
 def _returned_expressions(node: ast.AST) -> Iterator[ast.expr | None]:
@@ -228,13 +230,9 @@ def _describe(annotation: ast.expr) -> str:
         case ast.Subscript(kind):
             return _describe(kind)
     name = _name(annotation)
-    return (
-        "a list"
-        if name in _LISTS
-        else "an object"
-        if name in _OBJECTS
-        else _DESCRIPTIONS.get(name, name)
-    )
+    if name in _LISTS:
+        return "a list"
+    return "an object" if name in _OBJECTS else _DESCRIPTIONS.get(name, name)
 
 
 def _name(annotation: ast.expr) -> str:

@@ -75,13 +75,10 @@ def set_excesses(prepared: PreparedRun) -> dict[tuple[str, str], Problem]:
     places: dict[tuple[str, str], int] = {}
     if not any(component.input_limits for component in prepared.system.components.values()):
         return found
-    connected = {
-        (end.component, end.scalar)
-        for end in (connection.target for connection in prepared.system.connections)
-    }
+    connected = {connection.target for connection in prepared.system.connections}
     for name, variable, value, where in _set_values(prepared):
         limits = prepared.system.components[name].input_limits
-        scalars = [scalar for scalar in variable.scalar_names if (name, scalar) not in connected]
+        scalars = [each for each in variable.scalar_names if (name, each) not in connected]
         given = dict(zip(variable.scalar_names, np.ravel(value).tolist(), strict=False))
         excesses = [
             each
@@ -207,11 +204,10 @@ def _find_excesses(
     Unconnected inputs that are `known` by component and variable are left out.
     """
     system = prepared.system
-    limits = {
-        Endpoint(name, scalar): each
-        for name, component in system.components.items()
-        for scalar, each in component.input_limits.items()
-    }
+    limits: dict[Endpoint, tuple[float, float]] = {}
+    for name, component in system.components.items():
+        for scalar, each in component.input_limits.items():
+            limits[Endpoint(name, scalar)] = each
     if not limits:
         return
     recorded = {

@@ -11,9 +11,10 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from functools import cached_property
+from itertools import chain
 from typing import NamedTuple
 
-from ..core.component import Component, Variable
+from ..core.component import Variable, scalars_of
 from ..core.errors import abbreviate_names
 from ..core.system import Endpoint, System, incompatibility
 from .nested_systems import Node
@@ -133,7 +134,7 @@ class OutputFinder:
     @cached_property
     def _nested_systems(self) -> Set[str]:
         """Full names of all nested systems, of which connections name ports."""
-        return {node.full_name(name) for node in self._root.walk() for name in node.children}
+        return {node.prefix for node in self._root.walk()}
 
     def _node(self, systems: Iterable[str]) -> Node:
         node = self._root
@@ -199,20 +200,12 @@ def _largest_first(
     left = {pair: list(pairs[pair]) for pair in sorted(pairs)}
     while left:
         (target, _), covered = max(left.items(), key=lambda item: len(item[1]))
-        yield (
-            target,
-            [
-                source
-                for (other, source), places in left.items()
-                if (other, places) == (target, covered)
-            ],
-            covered,
-        )
-        rest = {
-            pair: [place for place in places if place not in covered]
-            for pair, places in left.items()
-        }
-        left = {pair: places for pair, places in rest.items() if places}
+        sources = [pair[1] for pair in left if pair[0] == target and left[pair] == covered]
+        yield target, sources, covered
+        for pair, places in list(left.items()):
+            left[pair] = [place for place in places if place not in covered]
+            if not left[pair]:
+                del left[pair]
 
 
 def _common_variable(ends: Sequence[str]) -> str:
@@ -239,11 +232,9 @@ def find_missing_connections(
     components of which no input is fed.
 
     An input probably lacks a connection if an output has its name, if outputs feed other elements
-    of its vector, or if it is a
-    single number and half of the component's inputs or more (vectors count once) are fed or set.
-    Vectors of which no element is
-    fed are often disturbances, a vertical component ("force.z") beside horizontal ones that are
-    fed is often 0 on purpose, and
+    of its vector, or if it is a single number and half of the component's inputs or more (vectors
+    count once) are fed or set. Vectors of which no element is fed are often disturbances, a
+    vertical component ("force.z") beside horizontal ones that are fed is often 0 on purpose, and
     Booleans are requests that nothing makes.
 
     Args:
@@ -257,10 +248,10 @@ def find_missing_connections(
     finder, fed_vectors, isolated = OutputFinder(root, system), _fed_vectors(system), []
     explained: set[Endpoint] = set()
     for missing in finder.missing_connections(unconnected):
-        explained.update(end for ends in missing.inputs.values() for end in ends)
+        explained.update(chain.from_iterable(missing.inputs.values()))
         yield next(iter(missing.inputs)).member_name, _missing_text(missing)
     for name, component in system.components.items():
-        inputs = _input_slots(name, component)
+        inputs = [Endpoint(name, scalar) for scalar in scalars_of(component.variables, "input")]
         unfed = {end: unconnected[end] for end in inputs if end in unconnected}
         suspects = [end for end in _suspects(inputs, unfed, fed_vectors) if end not in explained]
         if unfed and len(unfed) == len(inputs) and explained.isdisjoint(unfed):
@@ -292,39 +283,28 @@ def _missing_text(missing: MissingConnection) -> str:
     )
 
 
-def _input_slots(name: str, component: Component) -> list[Endpoint]:
-    return [
-        Endpoint(name, slot)
-        for v in component.variables
-        if v.causality == "input"
-        for slot in v.scalar_names
-    ]
-
-
 def _fed_vectors(system: System) -> set[Endpoint]:
     """Return the vectors of inputs that outputs of other components feed, as a whole or in part."""
     prefix = f"{PROFILE_PREFIX}."
     ends = (c.target for c in system.connections if not c.source.component.startswith(prefix))
-    return {Endpoint(end.component, vector) for end in ends if (vector := _vector(end.scalar))}
+    return {Endpoint(end.component, _vector(end.scalar)) for end in ends if _vector(end.scalar)}
 
 
 def _suspects(
     inputs: list[Endpoint], unfed: VariablesByEndpoint, fed_vectors: set[Endpoint]
 ) -> list[Endpoint]:
     """Return the unfed inputs that probably lack a connection, whatever the outputs are."""
-    groups, unfed_groups = (
-        {_vector(end.scalar) or end.scalar for end in ends} for ends in (inputs, unfed)
-    )
+    groups = {_vector(end.scalar) or end.scalar for end in inputs}
+    unfed_groups = {_vector(end.scalar) or end.scalar for end in unfed}
     is_mostly_fed = 2 * len(groups - unfed_groups) >= len(groups)
-    return [
-        end
-        for end, variable in unfed.items()
-        if (
-            Endpoint(end.component, vector := _vector(end.scalar)) in fed_vectors
-            and not end.scalar.endswith(".z")
-        )
-        or (is_mostly_fed and not vector and variable.type != "Boolean")
-    ]
+    suspects = []
+    for end, variable in unfed.items():
+        vector = _vector(end.scalar)
+        lacks_element = (end.component, vector) in fed_vectors and not end.scalar.endswith(".z")
+        is_scalar = not vector and variable.type != "Boolean"
+        if lacks_element or (is_mostly_fed and is_scalar):
+            suspects.append(end)
+    return suspects
 
 
 def _vector(slot: str) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple
 
-from ..core.component import Component, Variable
+from ..core.component import Component, Variable, scalars_of
 from ..core.errors import abbreviate_names, did_you_mean
 from .nested_systems import Node
 from .schema import ScenarioSpec
@@ -74,12 +74,10 @@ def resolve_name(
         raise UnknownNameError
     inner_names = _port_targets(child, ports)
     if port in inner_names:
-        suffix = rest[len(port) :]
-        return [
-            target
-            for inner in inner_names[port]
-            for target in resolve_name(child, inner + suffix, ports, include_inner)
-        ]
+        targets: list[Target] = []
+        for inner in inner_names[port]:
+            targets += resolve_name(child, inner + rest[len(port) :], ports, include_inner)
+        return targets
     if include_inner and port in {*child.spec.components, *child.invalid_components}:
         return resolve_name(child, rest, ports, include_inner)
     if "ports" in child.invalid_keys:
@@ -93,8 +91,11 @@ def resolve_name(
 
 def _port_targets(node: Node, kinds: Sequence[str]) -> Mapping[str, Sequence[str]]:
     """Return the inner names of every port of the given kinds."""
-    ports = [port for kind in kinds for port in getattr(node.ports, kind).items()]
-    return {name: [inner] if isinstance(inner, str) else inner for name, inner in ports}
+    targets = {}
+    for kind in kinds:
+        for name, inner in getattr(node.ports, kind).items():
+            targets[name] = [inner] if isinstance(inner, str) else inner
+    return targets
 
 
 class PrefixIndex:
@@ -117,13 +118,8 @@ class SlotIndex:
     """Scalars of the variables of one causality of a component, searched by prefix."""
 
     def __init__(self, component: Component, causality: str):
-        slots = (
-            slot
-            for variable in component.variables
-            if variable.causality == causality
-            for slot in variable.scalar_names
-        )
-        self._positions = {slot: position for position, slot in enumerate(slots)}
+        scalars = scalars_of(component.variables, causality)
+        self._positions = {scalar: position for position, scalar in enumerate(scalars)}
         self._names = PrefixIndex(self._positions)
 
     def below(self, prefix: str) -> dict[str, str]:
@@ -148,9 +144,8 @@ class SlotIndex:
                 for slot in sorted(found, key=self._positions.__getitem__)
             }
         slots = [prefix] if prefix in self._positions else []
-        slots += [
-            slot for separator in ".[" for slot in self._names.with_prefix(prefix + separator)
-        ]
+        for separator in ".[":
+            slots += self._names.with_prefix(prefix + separator)
         return {
             slot[len(prefix) :]: slot for slot in sorted(slots, key=self._positions.__getitem__)
         }
@@ -209,12 +204,9 @@ def check_assignment(
             each: check_value(variables[each], element)
             for each, element in zip(names, value, strict=True)
         }
-    settable = [
-        v.name
-        for causality in ("parameter", "input")
-        for v in variables.values()
-        if v.causality == causality
-    ]
+    settable: list[str] = []
+    for causality in ("parameter", "input"):
+        settable += [v.name for v in variables.values() if v.causality == causality]
     valid = abbreviate_names(re.sub(r"\[\d+\]$", "", each) for each in settable)
     hint = did_you_mean(text, settable) or (valid and f"; valid: {valid}")
     raise UnknownNameError(f'component "{name}" has no variable "{text}"{hint}')

@@ -191,11 +191,9 @@ def kpi_name_problem(kpi: str, kpis: Sequence[FunctionSpec], folder: Path) -> st
     if name in values and (not values[name] or key.partition("[")[0] in values[name]):
         return ""
     own = {name: values[name]} if name in values else values
-    known = (
-        f"{each}.{value}" if value else each
-        for each, names in own.items()
-        for value in names or [""]
-    )
+    known: list[str] = []
+    for each, names in own.items():
+        known += [f"{each}.{value}" for value in names] or [each]
     return f'no KPI "{kpi}"{kpi_hint(kpi.partition("[")[0], known)}'
 
 
@@ -219,11 +217,11 @@ def _annotation_names(annotation: ast.expr | None) -> set[str]:
 
 def _signal_prefixes(signals: Collection[str]) -> list[str]:
     """Return all names that are prefixes of signals."""
-    return list(
-        dict.fromkeys(
-            name[: match.start()] for name in signals for match in re.finditer(r"[.\[]", name)
-        )
-    )
+    prefixes: dict[str, None] = {}
+    for name in signals:
+        for match in re.finditer(r"[.\[]", name):
+            prefixes[name[: match.start()]] = None
+    return list(prefixes)
 
 
 def load_function(reference: str, folder: Path) -> Callable[..., Any]:

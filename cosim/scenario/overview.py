@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ..core import __version__
+from ..core.component import scalars_of
 from ..core.system import Connection, Group, Stage, System
 from ..engine.transfer_plan import unit_conversion
 
@@ -72,22 +73,18 @@ def _versions() -> dict[str, str]:
 
 def _describe_component(system: System, name: str, source: str) -> dict[str, Any]:
     variables = system.components[name].variables
-    inputs, outputs = (
-        sum(len(v.scalar_names) for v in variables if v.causality == kind)
-        for kind in ("input", "output")
-    )
     period = system.periods.get(name)
     return {
         "name": name,
         "origin": source,
-        "inputs": inputs,
-        "outputs": outputs,
+        "inputs": len(scalars_of(variables, "input")),
+        "outputs": len(scalars_of(variables, "output")),
         "period": None if period is None else float(period),
     }
 
 
 def _describe_stages(stages: Iterable[Stage]) -> list[list[Any]]:
-    return [[_describe_member(member) for member in stage] for stage in stages]
+    return [list(map(_describe_member, stage)) for stage in stages]
 
 
 def _describe_member(member: str | Group) -> Any:

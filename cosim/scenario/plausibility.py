@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..components.fmi import FmuDescription
 from ..components.fmi.changed_sources import changed_sources_warning
+from ..core.component import scalars_of
 from ..core.errors import Problem, abbreviate_names
 from ..core.paths import is_file
 from ..core.system import Endpoint
@@ -96,17 +97,17 @@ def unconnected_inputs(prepared: PreparedRun) -> VariablesByEndpoint:
     system = prepared.system
     connected = {connection.target for connection in system.connections}
     changes = [system.start_values, *(event.values for event in prepared.settings.events)]
-    assigned = {
-        (component, name) for values in changes for component, own in values.items() for name in own
-    }
-    return {
-        end: variable
-        for name, component in system.components.items()
-        for variable in component.variables
-        if variable.causality == "input" and (name, variable.name) not in assigned
-        for slot in variable.scalar_names
-        if (end := Endpoint(name, slot)) not in connected
-    }
+    assigned: set[tuple[str, str]] = set()
+    for values in changes:
+        for component, own in values.items():
+            assigned.update((component, name) for name in own)
+    unconnected: VariablesByEndpoint = {}
+    for name, each in system.components.items():
+        for scalar, variable in scalars_of(each.variables, "input").items():
+            end = Endpoint(name, scalar)
+            if end not in connected and (name, variable.name) not in assigned:
+                unconnected[end] = variable
+    return unconnected
 
 
 def _large_steps(prepared: PreparedRun) -> Iterator[Problem]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from ..core.component import Component
+from ..core.component import Component, scalars_of
 from ..core.errors import Problem, pattern_hint
 from ..core.expressions import parse_condition
 from ..core.system import Endpoint
@@ -82,13 +82,11 @@ class SignalSelector:
 def _signal_endpoints(
     components: Mapping[str, Component], causalities: Sequence[str]
 ) -> dict[str, Endpoint]:
-    return {
-        f"{name}.{slot}": Endpoint(name, slot)
-        for name, component in components.items()
-        for variable in component.variables
-        if variable.causality in causalities
-        for slot in variable.scalar_names
-    }
+    ends = {}
+    for name, component in components.items():
+        for scalar in scalars_of(component.variables, *causalities):
+            ends[f"{name}.{scalar}"] = Endpoint(name, scalar)
+    return ends
 
 
 def _matching_names(pattern: str, names: PrefixIndex) -> list[str]:

@@ -49,15 +49,15 @@ KEYED_LISTS = {
 NOT_INHERITED = ("$schema", "name", "description", "reference")
 
 
+def _names_like(pattern: str) -> dict[str, Any]:
+    """Return the JSON Schema of one or more names."""
+    return {"pattern": pattern, "items": {"pattern": pattern}, "minItems": 1}
+
+
 #: the rules of the validators below that JSON Schema can express
 _CONNECTION_RULES: dict[str, Any] = {
     "anyOf": [
-        {
-            "properties": {
-                end: {"pattern": pattern, "items": {"pattern": pattern}, "minItems": 1}
-                for end in ("from", "to")
-            }
-        }
+        {"properties": dict.fromkeys(("from", "to"), _names_like(pattern))}
         for pattern in (r"^[^*]*$", r"^[^*]*\*[^*]*$")
     ]
 }

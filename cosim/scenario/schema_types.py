@@ -86,8 +86,9 @@ def _check_not_negative(value: Fraction) -> Fraction:
 
 
 def _check_value(value: Any) -> Any:
-    rows = value if isinstance(value, list) else [value]
-    values = [v for row in rows for v in (row if isinstance(row, list) and row else [row])]
+    values: list[Any] = []
+    for row in value if isinstance(value, list) else [value]:
+        values += row if isinstance(row, list) and row else [row]
     if not values or not all(isinstance(v, bool | int | float | str) for v in values):
         raise ValueError("expected a number, true, false, a text, or a list of these")
     return value

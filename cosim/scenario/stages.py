@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import permutations
 from typing import NamedTuple
 
-from ..core.component import Component
+from ..core.component import Component, scalars_of
 from ..core.errors import abbreviate_names
 from ..core.graph import ordered_groups, strong_components
 from ..core.system import (
@@ -48,24 +49,17 @@ class StagePlanner:
     """
 
     def __init__(self, components: Mapping[str, Component], connections: Sequence[Connection]):
-        variables: dict[str, dict[str, str]] = {}
-        for end in {connection.target: None for connection in connections}:
-            if end.component not in variables:
-                own = components[end.component].variables
-                variables[end.component] = {
-                    scalar: variable.name for variable in own for scalar in variable.scalar_names
-                }
-        direct = {name: _direct_inputs(components[name]) for name in variables}
-        self._links = {
-            _Link(
-                c.source.component,
-                c.target.component,
-                inputs is None or variables[c.target.component][c.target.scalar] in inputs,
-            )
-            for c in connections
-            if not c.delay and c.target.scalar in variables[c.target.component]
-            for inputs in (direct[c.target.component],)
-        }
+        targets = {connection.target.component: None for connection in connections}
+        variables = {name: scalars_of(components[name].variables) for name in targets}
+        direct = {name: _direct_inputs(components[name]) for name in targets}
+        self._links: set[_Link] = set()
+        for connection in connections:
+            source, target = connection.source, connection.target
+            variable = variables[target.component].get(target.scalar)
+            if variable and not connection.delay:
+                inputs = direct[target.component]
+                is_direct = inputs is None or variable.name in inputs
+                self._links.add(_Link(source.component, target.component, is_direct))
 
     def root_stages(self, root: Node, spec: SystemSpec) -> tuple[Stage, ...]:
         """Return the root's stages.
@@ -88,15 +82,11 @@ class StagePlanner:
             node.spec.algorithm.stages if node.spec.algorithm and not node.has_wrong_names else None
         )
         stages = [[name] for name in self._automatic_order(node)] if listed is None else listed
-        return tuple(
-            tuple(
-                self._stage_member(node, name)
-                for name in stage
-                if name not in node.invalid_components
-            )
-            for stage in stages
-            if stage
-        )
+        result: list[Stage] = []
+        for stage in filter(None, stages):
+            valid = [name for name in stage if name not in node.invalid_components]
+            result.append(tuple(self._stage_member(node, name) for name in valid))
+        return tuple(result)
 
     def _automatic_order(self, node: Node) -> list[str]:
         depth = len(node.prefix.split(".")) if node.prefix else 0
@@ -110,12 +100,12 @@ class StagePlanner:
                     feeders[target].add(source)
                     if link.is_direct:
                         direct[target].add(source)
-        return [
-            name
-            for group in ordered_groups(feeders)
-            for inner in ordered_groups({member: direct[member] for member in group})
-            for name in inner
-        ]
+        # a group is a loop of components; only direct dependencies order the components in it
+        order: list[str] = []
+        for group in ordered_groups(feeders):
+            for inner in ordered_groups({member: direct[member] for member in group}):
+                order += inner
+        return order
 
     def _stage_member(self, node: Node, name: str) -> str | Group:
         if name in node.children:
@@ -159,12 +149,10 @@ def recommend(system: System) -> list[str]:
     for connection in inner:
         feeders[connection.target.component].add(connection.source.component)
     groups = ordered_groups(feeders)
-    iterated = {
-        name
-        for group in iterate_groups(system.stages)
-        if group.iteration
-        for name in component_names(group.stages)
-    }
+    iterated: set[str] = set()
+    for each in iterate_groups(system.stages):
+        if each.iteration:
+            iterated.update(component_names(each.stages))
     lines = list(_late_values(system, inner, groups))
     within = [c for c in system.connections if not c.delay]
     for group in (group for group in groups if not iterated.issuperset(group)):
@@ -185,7 +173,9 @@ def _late_values(
     system: System, connections: Sequence[Connection], groups: Sequence[Sequence[str]]
 ) -> Iterator[str]:
     """Yield a line if values are one step old although their reader does not feed their source."""
-    number = {name: i for i, group in enumerate(groups) for name in group}
+    number: dict[str, int] = {}
+    for i, group in enumerate(groups):
+        number |= dict.fromkeys(group, i)
     position = dict(_positions(system.stages))
     late = [
         c
@@ -238,7 +228,7 @@ def _coupling(
             "interpolate, which raises the order to 2"
         )
     elif not linear and not any(
-        _steps_earlier(position[a], position[b]) for a in group for b in group
+        _steps_earlier(position[a], position[b]) for a, b in permutations(group, 2)
     ):
         yield (
             f"one stage for each of {names}: they depend on each other, and later stages get "

@@ -217,13 +217,10 @@ class SystemBuilder:
         return self._variables_by_component[name]
 
     def _connections(self) -> Iterator[Connection]:
-        inputs_with_values = {
-            Endpoint(name, slot)
-            for name, values in self.start_values.items()
-            for variable in self.components[name].variables
-            if variable.name in values
-            for slot in variable.scalar_names
-        }
+        inputs_with_values: set[Endpoint] = set()
+        for name, values in self.start_values.items():
+            for variable in map(self._variables(name).__getitem__, values):
+                inputs_with_values |= {Endpoint(name, slot) for slot in variable.scalar_names}
         wiring = Wiring(self.components, inputs_with_values)
         for node in self.root.walk():
             wiring.connect(node)

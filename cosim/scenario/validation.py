@@ -9,7 +9,7 @@ import json
 import types
 import typing
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import count
+from itertools import chain, count
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -127,7 +127,9 @@ def schema_problems(
     """
     details = [(_error_path(detail), detail) for detail in error.errors(include_url=False)]
     invalid = set(document.invalid_paths)
-    above_invalid = {path[:n] for path in invalid for n in range(len(path))}
+    above_invalid: set[tuple[str | int, ...]] = set()
+    for path in invalid:
+        above_invalid.update(path[:n] for n in range(len(path)))
     unknown_keys = {path: detail for path, detail in details if detail["type"] == "extra_forbidden"}
     illegal_names = {
         detail["input"] for _, detail in details if detail["loc"][::2] == ("components", "[key]")
@@ -315,5 +317,5 @@ def _union_members(kind: Any) -> list[Any]:
     if typing.get_origin(kind) is typing.Annotated:
         return _union_members(typing.get_args(kind)[0])
     if typing.get_origin(kind) in (typing.Union, types.UnionType):
-        return [option for member in typing.get_args(kind) for option in _union_members(member)]
+        return list(chain.from_iterable(map(_union_members, typing.get_args(kind))))
     return [kind]

@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Sequence
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -83,7 +84,7 @@ def _flatten(variable: Variable, value: list[Any]) -> list[Any]:
         )
     rows = value
     for _ in variable.shape[1:]:
-        rows = [element for row in rows for element in row]
+        rows = list(chain.from_iterable(rows))
     return rows
 
 

@@ -6,9 +6,10 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
+from itertools import chain
 from typing import NamedTuple
 
-from ..core.component import Component, Variable
+from ..core.component import Component, Variable, scalars_of
 from ..core.errors import Problem, abbreviate_names, did_you_mean
 from ..core.size_limits import MAX_CONNECTIONS, require_at_most
 from ..core.system import Connection, Endpoint, incompatibility
@@ -120,11 +121,7 @@ class Wiring:
                 problem for end, problem in self._unmatched_inputs.items() if end not in explained
             )
             self.problems += dict.fromkeys(unmatched)
-        return (
-            connection
-            for candidate in self._by_input.values()
-            for connection in candidate.connections
-        )
+        return chain.from_iterable(each.connections for each in self._by_input.values())
 
     def _expand(self, node: Node, i: int, spec: ConnectionSpec) -> None:
         path, where_to = ("connections", i, "from"), node.where("connections", i, "to")
@@ -232,14 +229,11 @@ class Wiring:
     @cached_property
     def _variables(self) -> Mapping[Endpoint, Variable]:
         """Variables of all components by their scalars."""
-        variables = (
-            (name, variable) for name, c in self._components.items() for variable in c.variables
-        )
-        return {
-            Endpoint(name, slot): variable
-            for name, variable in variables
-            for slot in variable.scalar_names
-        }
+        variables = {}
+        for name, component in self._components.items():
+            for scalar, variable in scalars_of(component.variables).items():
+                variables[Endpoint(name, scalar)] = variable
+        return variables
 
     def _add(self, new: _Candidate) -> None:
         first = new.connections[0]

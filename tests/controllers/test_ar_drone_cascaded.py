@@ -5,6 +5,7 @@ controller, bit for bit.
 from __future__ import annotations
 
 import json
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -33,18 +34,20 @@ class Wired:
         for port, value in inputs.items():
             head, *_ = port.split(".")
             self._deliver(SYSTEM["ports"]["inputs"][head], head, port, value, pending)
-        for name in (name for stage in SYSTEM["algorithm"]["stages"] for name in stage):
+        for name in chain.from_iterable(SYSTEM["algorithm"]["stages"]):
             for output, value in self.blocks[name].step(pending[name]).items():
                 signals[f"{name}.{output}"] = value
                 for wire in SYSTEM["connections"]:
                     if covered(f"{name}.{output}", wire["from"]):
                         self._deliver(wire["to"], wire["from"], f"{name}.{output}", value, pending)
-        return {
-            port + signal.removeprefix(inner): value
-            for port, inner in SYSTEM["ports"]["outputs"].items()
-            for signal, value in signals.items()
-            if covered(signal, inner)
-        }
+        outputs = dict[str, float]()
+        for port, inner in SYSTEM["ports"]["outputs"].items():
+            outputs |= {
+                port + signal.removeprefix(inner): value
+                for signal, value in signals.items()
+                if covered(signal, inner)
+            }
+        return outputs
 
     def _deliver(
         self,

@@ -1,4 +1,4 @@
-"""The C controller against its control law in NumPy, and as a replacement of the shipped autopilot."""
+"""The C controller against its control law in NumPy, and in place of the shipped autopilot."""
 
 from __future__ import annotations
 
@@ -49,7 +49,8 @@ def stepped(keeper, measured):
         keeper.step(dict(zip(measured, values, strict=True)))
         for values in zip(*measured.values(), strict=True)
     ]
-    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    values = np.array([list(row.values()) for row in rows]).T
+    return dict(zip(rows[0], values, strict=True))
 
 
 def expected_thrust(error):

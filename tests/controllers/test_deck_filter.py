@@ -48,7 +48,7 @@ def step_inputs(
 
 
 def final_error(controller: Callable[..., Any], seed: int) -> tuple[np.ndarray, float]:
-    """Return the error of the deck's position after 1.5 s and the deviation that the filter states."""
+    """Return the error of the deck's position after 1.5 s and its stated deviation."""
     rng, filter_fmu, last = (
         np.random.default_rng(seed),
         controller("deck_filter"),

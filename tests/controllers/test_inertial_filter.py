@@ -21,13 +21,17 @@ from plant_src.sensors.imu import IMU_DEVICES
 HEADERS = resources.root() / "controllers/modelica/Estimation/Resources/Include"
 COMPILER = shutil.which("cc") or shutil.which("gcc") or "cc"
 SOURCE = """#include "inertial_ekf.h"
-void start(int n, const double *p, const double *v, const double *b, const double *e, const double *d, const double *noise,
+void start(int n, const double *p, const double *v, const double *b, const double *e,
+           const double *d, const double *noise,
            double *s)
-{ for (int i = 0; i < n; i++) ekf_start(p + 3 * i, v + 3 * i, b + 3 * i, e, d, noise, s + 244 * i); }
-void step(int n, double *s, double h, const double *r, const double *f, const double *d, int fix, const double *p,
-          const double *v, double delay, int has_field, const double *b, const double *e, const double *noise)
+{ for (int i = 0; i < n; i++)
+    ekf_start(p + 3 * i, v + 3 * i, b + 3 * i, e, d, noise, s + 244 * i); }
+void step(int n, double *s, double h, const double *r, const double *f, const double *d, int fix,
+          const double *p, const double *v, double delay, int has_field, const double *b,
+          const double *e, const double *noise)
 { for (int i = 0; i < n; i++, s += 244)
-    ekf_step(s, h, r + 3 * i, f + 3 * i, d, fix, p + 3 * i, v + 3 * i, delay, has_field, b + 3 * i, e, noise, s); }
+    ekf_step(s, h, r + 3 * i, f + 3 * i, d, fix, p + 3 * i, v + 3 * i, delay, has_field,
+             b + 3 * i, e, noise, s); }
 """
 H, DELAY, SIZE = 0.01, 0.05, 244
 NOISE = np.array([0.02, 0.03, 0.05, 0.012])
@@ -140,7 +144,7 @@ class Flights:
         self.library.step(COUNT, self.states, H, rates, force, self.density, *sight, NOISE)
 
     def normalised_errors(self) -> np.ndarray:
-        """Return the normalised estimation errors squared (NEES) of all 15 errors, one per start."""
+        """Return the normalised estimation errors squared (NEES) of all 15 errors."""
         s = self.states
         turns = (Rotation.from_quat(s[:, [7, 8, 9, 6]]).inv() * self.attitude).as_rotvec()
         biases = self.biases[0] - s[:, 10:13], self.biases[1] - s[:, 13:16]
@@ -194,12 +198,10 @@ def normalised_errors(result: cosim.Result, estimate: str, truth: str) -> np.nda
         result[f"{estimate}.velocity.{axis}"] - result[f"{motion}.velocity.{axis}"]
         for axis in "xyz"
     ]
-    turns = [
-        Rotation.from_quat(
-            np.column_stack([result[f"{name}.orientation.{part}"] for part in "xyzw"])
-        )
-        for name in (estimate, truth)
-    ]
+    turns = []
+    for name in (estimate, truth):
+        parts = [result[f"{name}.orientation.{part}"] for part in "xyzw"]
+        turns.append(Rotation.from_quat(np.column_stack(parts)))
     errors += list((turns[0].inv() * turns[1]).as_rotvec().T)
     deviations = [result[f"{estimate}.deviation[{i}]"] for i in range(1, 10)]
     return np.column_stack(

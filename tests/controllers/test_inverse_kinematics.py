@@ -74,14 +74,11 @@ def random_ticks(rng: np.random.Generator, count: int = 600) -> list[dict[str, f
     """
     z = 2.0 + 0.3 * np.sin(np.arange(count) / 40)
     ranges = {"acceleration_command.x": 3.0, "acceleration_command.y": 3.0, "yaw_command": 3.1}
-    ticks = [
-        {name: float(rng.uniform(-width, width)) for name, width in ranges.items()}
-        for _ in range(count)
-    ]
-    return [
-        {**tick, "altitude_command": 2.0, "vehicle.position.z": float(height)}
-        for tick, height in zip(ticks, z, strict=True)
-    ]
+    ticks = []
+    for height in z.tolist():
+        tick = {name: float(rng.uniform(-width, width)) for name, width in ranges.items()}
+        ticks.append({**tick, "altitude_command": 2.0, "vehicle.position.z": height})
+    return ticks
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -126,7 +126,7 @@ def test_other_controllers_land_in_the_first_demo(tmp_path, controller):
 
 
 def touchdown_tilt(**parameters):
-    """Return the touchdown tilt of the geometric controller in waves and gusts, on a fast vessel."""
+    """Return the touchdown tilt of the geometric controller in waves and gusts on a vessel."""
     sea = "/components/plant/arguments/environment"
     weather = {
         f"{sea}/waves/significant_height": 0.2,

@@ -231,14 +231,14 @@ def test_registered_variables_are_the_whole_state() -> None:
     for name in TWINS:
         twin = InProcess(name, {})
         variables = {v.name: v for v in twin.component.variables}
-        inputs = [
-            {
-                n: bool(rng.integers(2)) if v.type == "Boolean" else float(rng.normal())
-                for n, v in variables.items()
-                if v.causality == "input"
-            }
-            for _ in range(60)
-        ]
+        inputs = []
+        for _ in range(60):
+            tick = dict[str, float]()
+            for n, v in variables.items():
+                if v.causality == "input":
+                    flag = v.type == "Boolean"
+                    tick[n] = bool(rng.integers(2)) if flag else float(rng.normal())
+            inputs.append(tick)
         for tick in inputs[:30]:
             twin.step(tick)
         state, time = twin.component._slave._get_fmu_state(), twin.time

@@ -7,6 +7,7 @@ in no mass does the same. The figures hold within 3 % or 0.05 s.
 
 from __future__ import annotations
 
+from itertools import chain
 from math import pi
 from typing import Any
 
@@ -27,7 +28,7 @@ def respond(
     loops = [
         controller(name, {"mass": mass} if name == "altitude_controller" else {}) for name in LOOPS
     ]
-    outputs = [variable.name for kind in plant.outputs.values() for variable in kind]
+    outputs = [variable.name for variable in chain.from_iterable(plant.outputs.values())]
     bus: dict[str, Any] = {f"vehicle.{name}": plant.get(name) for name in outputs} | {
         "reset": False,
         "motor_share": 1.0,
@@ -39,7 +40,8 @@ def respond(
         state = plant.step({name: bus[name] for name in ROTORS})
         bus |= {f"vehicle.{name}": value for name, value in state.items()} | step
         rows.append(state | {"throttle": bus["throttle"]})
-    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    values = np.array([list(row.values()) for row in rows]).T
+    return dict(zip(rows[0], values, strict=True))
 
 
 def rise_time(signal: np.ndarray) -> float:

@@ -3,6 +3,7 @@ shipped controller.
 """
 
 import json
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -35,12 +36,9 @@ def fly(fmu, folder, *options):
 
 
 def outputs(fmu):
-    return [
-        name
-        for v in FmuFile(fmu).description.variables
-        if v.causality == "output"
-        for name in v.scalar_names
-    ]
+    variables = FmuFile(fmu).description.variables
+    names = [variable.scalar_names for variable in variables if variable.causality == "output"]
+    return [*chain.from_iterable(names)]
 
 
 def assert_flies(done):

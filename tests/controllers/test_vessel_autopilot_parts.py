@@ -33,7 +33,9 @@ from pythonfmu import Fmi2Causality, Fmi2Slave, Real
 class RateDamped(Fmi2Slave):
     def __init__(self, **arguments):
         super().__init__(**arguments)
-        self.vehicle = SimpleNamespace(attitude=SimpleNamespace(yaw=0.0), rates=SimpleNamespace(r=0.0))
+        self.vehicle = SimpleNamespace(
+            attitude=SimpleNamespace(yaw=0.0), rates=SimpleNamespace(r=0.0)
+        )
         self.heading_reference = self.rudder_angle = 0.0
         for name in ("vehicle.attitude.yaw", "vehicle.rates.r", "heading_reference"):
             self.register_variable(Real(name, causality=Fmi2Causality.input))
@@ -41,7 +43,8 @@ class RateDamped(Fmi2Slave):
 
     def do_step(self, time, step_size):
         error = self.vehicle.attitude.yaw - self.heading_reference
-        rudder = 1.5 * (error if abs(error) <= pi else atan2(sin(error), cos(error))) + 0.8 * self.vehicle.rates.r
+        turn = error if abs(error) <= pi else atan2(sin(error), cos(error))
+        rudder = 1.5 * turn + 0.8 * self.vehicle.rates.r
         self.rudder_angle = max(-0.6, min(0.6, rudder))
         return True
 """

@@ -1,4 +1,4 @@
-"""Flight modes of the quadcopter in short flights of a vehicle that follows its references exactly."""
+"""Flight modes of the quadcopter with a vehicle that follows its references exactly."""
 
 from __future__ import annotations
 

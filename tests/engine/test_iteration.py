@@ -88,7 +88,7 @@ def test_newtons_method_solves_a_coupling_for_which_the_fixed_point_diverges(sta
 
 @pytest.mark.usefixtures("executor")
 def test_newtons_method_passes_integers_on():
-    """a = 3 a + n - 1 with the integer n = 4, which another component of the loop counts: a = -1.5."""
+    """a = 3 a + n - 1 with the integer n = 4, which another component counts: a = -1.5."""
     count = FakeComponent(
         [*inputs("u"), *outputs("n", type="Int32")], lambda values, _t, _h: values.update(n=4)
     )

@@ -292,7 +292,7 @@ def fixed_counter():
     return component
 
 
-def test_without_variable_steps_a_run_ends_at_the_last_common_end_of_all_steps_before_the_stop_time():
+def test_without_variable_steps_a_run_ends_at_the_last_common_end_of_all_steps():
     built = make_system(
         {"a": fixed_counter(), "b": fixed_counter()}, periods={"b": exact_fraction(2)}
     )

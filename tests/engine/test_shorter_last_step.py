@@ -76,7 +76,7 @@ def test_an_fmu_without_variable_steps_stops_at_the_last_whole_step_and_is_named
 def test_an_fmu_with_fixed_steps_that_end_at_the_stop_time_does_not_hinder_the_others(
     probe, tmp_path
 ):
-    """Steps of 0.02 s end at 0.1 s, those of 0.03 s do not; the last one of these begins at 0.09 s."""
+    """Steps of 0.02 s end at 0.1 s, those of 0.03 s do not; the last of these begins at 0.09 s."""
     parts = {"a": create_component(FmuFile(with_fixed_steps(probe, tmp_path)), "a")}
     parts["b"] = create_component(FmuFile(probe), "b")
     periods = {"a": Fraction(2, 100), "b": Fraction(3, 100)}

@@ -1,4 +1,4 @@
-"""Native executors built from other sources than the package, as they stay behind in an editable installation."""
+"""Native executors built from other sources, as they stay behind in an editable installation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from cosim.engine.settings import Settings
 from cosim.export.fmu.compiler import find_compiler
 
 ENGINE = Path(native_executor.__file__).parent
-#: interface number of a build, and what differs in its source; builds from before there was a number have 0
+#: interface number of a build, and what differs in its source; the oldest builds have 0
 OTHER_SOURCES = {
     0: ('{"INTERFACE", INTERFACE}, ', ""),
     native_executor.INTERFACE + 1: ("{ INTERFACE = ", "{ INTERFACE = 1 + "),

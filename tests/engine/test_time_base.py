@@ -1,4 +1,4 @@
-"""Rows off the time grid: two rows of one time and a point at a third of a step, from both executors
+"""Rows off the time grid: two rows of one time and a point at a third of a step, from executors
 through the rows file, all output files, the comparison, KPIs and the report.
 """
 

@@ -114,14 +114,8 @@ KINDS = {"scenario": (SCENARIO, ScenarioSpec), "nested system": (NESTED, NestedS
 
 def paths(value, path=()):
     """Yield the paths of all values in a document."""
-    items = (
-        value.items()
-        if isinstance(value, dict)
-        else enumerate(value)
-        if isinstance(value, list)
-        else ()
-    )
-    for key, each in items:
+    items = enumerate(value) if isinstance(value, list) else ()
+    for key, each in value.items() if isinstance(value, dict) else items:
         yield (*path, key)
         yield from paths(each, (*path, key))
 
@@ -177,12 +171,12 @@ def test_the_schema_and_the_loader_agree(kind, key, tmp_path):
     complete, spec = KINDS[kind]
     document = MINIMUM | {key: complete[key]} if spec is ScenarioSpec else complete
     validator = Draft202012Validator(json_schema(nested=kind == "nested system"))
-    disagreements = [
-        f"{path} {change}: {found}"
-        for path in [(key,), *paths(document[key], (key,))]
-        for change, changed in mutants(document, path)
-        if bool(found := problems(changed, spec, tmp_path)) == validator.is_valid(changed)
-    ]
+    disagreements = []
+    for path in [(key,), *paths(document[key], (key,))]:
+        for change, changed in mutants(document, path):
+            found = problems(changed, spec, tmp_path)
+            if bool(found) == validator.is_valid(changed):
+                disagreements.append(f"{path} {change}: {found}")
     assert disagreements == []
 
 

@@ -56,10 +56,10 @@ def test_a_sum_of_prefixes_adds_the_outputs_of_the_same_names(folder):
     (line, *_) = folder.problems(plants, wires)
     assert "input three.ship.motor[1] has no matching output one.ship.position.1" in line
     names = {"x": "1", "y": "2"}
-    wires = [
-        connection([f"{p}.ship.position.{a}" for p in ("one", "two")], f"three.ship.motor[{i}]")
-        for a, i in names.items()
-    ]
+    wires = []
+    for axis, i in names.items():
+        sources = [f"one.ship.position.{axis}", f"two.ship.position.{axis}"]
+        wires.append(connection(sources, f"three.ship.motor[{i}]"))
     result = cosim.run(folder.scenario(plants, wires))
     assert result["three.ship.position.y"].tolist() == [1.0, 3.0, 5.0, 7.0]  # + 1 + 1 in each step
 

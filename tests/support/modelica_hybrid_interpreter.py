@@ -285,10 +285,7 @@ class HybridInterpreter(Interpreter):
         return [_element(self.values, key) for key in self._rates]
 
     def _crossed(self, time: float) -> tuple[bool, list[float]]:
-        """Return whether a relation differs from its stored value.
-
-        Also return the differences of the operands of all relations.
-        """
+        """Return whether a relation has changed, and the differences of the operands of all."""
         self.values["time"] = time
         self.evaluate.execute(self.schedule.between.indicators)
         changed, differences = False, []
@@ -363,7 +360,7 @@ class HybridInterpreter(Interpreter):
     ) -> float:
         """Return the first time in (time, time + h] after which a relation has changed.
 
-        Also return the states of this time.
+        The states are those of this time.
         """
         width = max(1e-10, 8 * 2.0**-52 * abs(time + h))
         left, right, after = 0.0, h, self._crossed(time + h)[1]

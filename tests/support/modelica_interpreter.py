@@ -34,7 +34,7 @@ _MAX_STEP_SIZE = 0.005
 
 @dataclass
 class EventEvaluator(Evaluator):
-    """Evaluator of the statements of a schedule with event flags, pre() and equation systems."""
+    """Evaluator of a schedule, with event flags, pre() and systems of equations."""
 
     #: variable -> value before the current event
     pre_values: MutableMapping[str, Any] = field(default_factory=dict)
@@ -110,7 +110,7 @@ class EventEvaluator(Evaluator):
 
 
 def _scale_of(derivatives: list[float], values: list[float]) -> float:
-    """Return the scale of a residual: the sum of |derivative| (1 + |unknown|), as in newton.h."""
+    """Return the scale of a residual, the sum of |derivative| (1 + |unknown|), as newton.h."""
     scale = 0.0
     for derivative, value in zip(derivatives, values, strict=True):
         scale += abs(derivative) * (1 + abs(value))
@@ -174,7 +174,7 @@ class Interpreter(AnalysedModel):
         self.clocks: list[list[Any]] = []
 
     def set(self, name: str, value: Any) -> None:
-        """Set a parameter or an input (arrays as a whole), and update the dependent parameters."""
+        """Set a parameter or an input as a whole, and the parameters that depend on it."""
         self.assign(name, value)
         if self.model.variables[name].variability == "parameter":
             self.update_dependent_parameters()
@@ -184,7 +184,7 @@ class Interpreter(AnalysedModel):
         return deepcopy(self.values[name])
 
     def initialize(self, time: float = 0.0) -> None:
-        """Apply start values and first ticks, and evaluate the equations at the start time (s).
+        """Apply the start values, start the clocks and evaluate the equations at a time (s).
 
         Raises:
             ComponentError: The model has failed.
@@ -195,7 +195,7 @@ class Interpreter(AnalysedModel):
         self.evaluate.event_flags.clear()
 
     def _start_clocks(self, time: float) -> None:
-        """Set `clocks`: start (s), period (s) and number of past ticks of each clock."""
+        """Set start (s), period (s) and number of past ticks of each clock."""
         self.clocks = []
         for clock in self.schedule.clocks:
             start, period = self.evaluate(clock.start), self.evaluate(clock.period)
@@ -286,7 +286,7 @@ class Interpreter(AnalysedModel):
         return [self.get(derivative_name(name)) for name in self.model.states]
 
     def _evaluate_event(self, function: str, time: float) -> None:
-        """Evaluate the equations at an event ("step") or the initialization ("initialize")."""
+        """Evaluate the equations at an event ("step") or at the initialization ("initialize")."""
         body = self.schedule.event if function == "step" else self.schedule.initialization
         self.values["time"] = time
         self.evaluate.pre_values = {

@@ -45,5 +45,8 @@ def wrap_angle(angle: float) -> float:
 
 
 def horizontal_norm(x: float, y: float) -> float:
-    """Return the Euclidean norm with the rounding of the Modelica function, from which math.hypot differs."""
+    """Return the Euclidean norm with the rounding of the Modelica function.
+
+    math.hypot rounds differently.
+    """
     return math.sqrt(x * x + y * y)

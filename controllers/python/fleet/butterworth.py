@@ -60,7 +60,10 @@ class Butterworth:
 
 
 def _section_coefficients(K: float) -> Iterator[tuple[float, float, float]]:
-    """Yield b, a1, a2 of b (1 + 1/z)^2 / (1 + a1/z + a2/z^2), one section for each pair of complex poles."""
+    """Yield b, a1, a2 of b (1 + 1/z)^2 / (1 + a1/z + a2/z^2).
+
+    There is one section for each pair of complex poles.
+    """
     for i in range(1, SECTION_COUNT + 1):
         damping = 2 * math.cos(math.pi * i / ORDER)
         a0 = 1 + damping * K + K * K

@@ -26,7 +26,7 @@ class HeadingControl(SampledController):
         self.yaw = self.add_block("yaw", Pid())
 
     def control_heading(self, reference: float) -> None:
-        """Set the rudder angle of this sample for a heading `reference` (rad, counter-clockwise from east)."""
+        """Set the rudder angle of this sample for a heading (rad, counter-clockwise from east)."""
         # a positive rudder angle reduces the yaw angle
         error = wrap_angle(self.vehicle.attitude.yaw - reference)
         limits = (-self.rudder_limit, self.rudder_limit)

@@ -8,7 +8,10 @@ from . import SAMPLE_PERIOD
 
 
 class Notch:
-    """Notch (s^2 + 2 depth w s + w^2)/(s^2 + 2 width w s + w^2) by the bilinear transform, in transposed direct form II."""
+    """Notch (s^2 + 2 depth w s + w^2) / (s^2 + 2 width w s + w^2) by the bilinear transform.
+
+    It is computed in transposed direct form II.
+    """
 
     def __init__(self) -> None:
         self.running, self.near, self.far = False, 0.0, 0.0

@@ -37,11 +37,13 @@ class RealWithUnit(Real):
 
 
 class SampledController(Fmi2Slave):
-    """PythonFMU class whose `tick` runs at every multiple of `SAMPLE_PERIOD` within a step, with the inputs of that step.
+    """PythonFMU class whose `tick` runs at every multiple of `SAMPLE_PERIOD` within a step.
 
-    Constructors declare variables by dotted names: `self.input("vehicle.position.z", 0.0, "m")` declares the variable and
-    creates the attribute `self.vehicle.position.z`. The start value defines the type; a list declares name[1], name[2], ...
-    All states must be declared, as local variables, because saved states consist of the declared variables.
+    It uses the inputs of that step. Constructors declare variables by dotted names:
+    `self.input("vehicle.position.z", 0.0, "m")` declares the variable and creates the attribute
+    `self.vehicle.position.z`. The start value defines the type; a list declares name[1], name[2],
+    ... All states must be declared, as local variables, because saved states consist of the
+    declared variables.
     """
 
     def __init__(self, **arguments: Any):
@@ -116,7 +118,10 @@ class SampledController(Fmi2Slave):
         )
 
     def add_block(self, name: str, block: BlockT) -> BlockT:
-        """Declare the attributes of a block, its states, as local variables below `name` and return the block."""
+        """Declare the attributes of a block, its states, as local variables below `name`.
+
+        Return the block.
+        """
         setattr(self, name, block)
         for state, start in list(vars(block).items()):
             self.local(f"{name}.{state}", start)

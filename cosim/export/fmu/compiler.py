@@ -56,7 +56,10 @@ def ziglang_command() -> list[str]:
 
 @cache
 def compiler_version(command: tuple[str, ...]) -> str:
-    """Return the first line of the compiler's version output, for example "gcc (Debian 12.2.0-14) 12.2.0"."""
+    """Return the version of a compiler, for example "gcc (Debian 12.2.0-14) 12.2.0".
+
+    It is the first line of the output.
+    """
     process = subprocess.run([*command, "--version"], capture_output=True, text=True, check=False)  # noqa: S603
     return process.stdout.partition("\n")[0].strip() or command[0]
 

@@ -64,7 +64,7 @@ def start_values(variable: BlockVariable) -> tuple[Any, ...]:
 
 
 def c_variable_table(block: Block, fmi_version: int) -> str:
-    """Return the text of `variables.h`, the C table of variables for the shell, without the instantiation token."""
+    """Return the text of `variables.h`, the table of variables for the shell, without the token."""
     entries = [_c_row(row, fmi_version) for row in variable_table(block, fmi_version)]
     if fmi_version == 3:
         entries.insert(0, '{"time", FLOAT64, READ_ONLY, offsetof(State, time), 1, 0}')

@@ -57,7 +57,6 @@ def to_bytes(root: Element) -> bytes:
 
 
 # -- FMI 2.0
-# ---------------------------------------------------------------------------------------------------------------
 
 
 def _fmi2_description(block: Block, token: str, c_files: Sequence[str]) -> Element:
@@ -120,7 +119,6 @@ def _add_fmi2_variable(
 
 
 # -- FMI 3.0
-# ---------------------------------------------------------------------------------------------------------------
 
 
 def _fmi3_description(block: Block, token: str) -> Element:
@@ -173,7 +171,6 @@ def _fmi3_description(block: Block, token: str) -> Element:
 
 
 # -- common to both versions
-# -----------------------------------------------------------------------------------------------
 
 
 def _root_element(block: Block, fmi_version: str, **token: str) -> Element:
@@ -220,7 +217,7 @@ def add_units(root: Element, names: Collection[str]) -> None:
 
 
 def _declared_types(block: Block) -> dict[Any, str]:
-    """Return the type name of each enumeration (a tuple of literals), which differs from all other names."""
+    """Return the unique type name of each enumeration (a tuple of literals)."""
     names: dict[Any, str] = {}
     taken = {variable.name for variable in block.variables}
     for variable in block.variables:
@@ -309,7 +306,7 @@ def _initial_unknown_indices(table: Sequence[TableRow], states: Mapping[int, int
 
 
 def _states_of_derivatives(block: Block, table: Sequence[TableRow]) -> dict[int, int]:
-    """Return the index of each derivative in the table -> the index of its state, in the order of the states."""
+    """Return derivative -> state, as indices in the table and in the order of the states."""
     rows: dict[str, list[int]] = {}
     for index, row in enumerate(table):
         rows.setdefault(row.variable.member, []).append(index)

@@ -29,7 +29,7 @@ _FMI_HEADERS = {
 
 
 def write_fmu(block: Block, fmi_version: int, target: Path) -> Path:
-    """Write the FMU of a block, for Co-Simulation and, if the block supports it, for Model Exchange.
+    """Write the FMU of a block, for Co-Simulation and possibly for Model Exchange.
 
     The same block and compiler give the same bytes.
 
@@ -80,7 +80,7 @@ def _description_and_sources(block: Block, fmi_version: int) -> dict[str, bytes]
 
 
 def _collect_sources(block: Block, fmi_version: int) -> dict[str, bytes]:
-    """Return all source files and headers that are needed to compile the FMU, without the instantiation token."""
+    """Return all files that are needed to compile the FMU, without the instantiation token."""
     sources = {name: text.encode() for name, text in block.files.items()}
     sources |= {name: path.read_bytes() for name, path in block.archives.items()}
     shell = _SHELL_FILES[fmi_version] + (_EXCHANGE_FILES[fmi_version] if block.exchange else ())

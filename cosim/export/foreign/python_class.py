@@ -149,7 +149,7 @@ def _included_files(folder: Path, include: Sequence[Path]) -> Iterator[tuple[Pat
 def _build_with_pythonfmu(
     source: Path, contents: Mapping[Path, bytes], class_name: str | None
 ) -> tuple[dict[str, bytes], Any]:
-    """Return the members of the FMU that PythonFMU builds (name -> contents), and the attribute `units` of the class."""
+    """Build the FMU; return its members (name -> contents) and the `units` of the class."""
     if taken := [file.name for file in _PROTECTION if Path(file.name) in contents]:
         raise InputError(
             Problem(
@@ -159,7 +159,8 @@ def _build_with_pythonfmu(
         )
     contents = {**contents, **{Path(file.name): file.read_bytes() for file in _PROTECTION}}
     named = [class_name] if class_name else []
-    package = f"{source.stem}_{sha256(repr([*sorted(contents.items()), *named]).encode()).hexdigest()[:12]}"
+    digest = sha256(repr([*sorted(contents.items()), *named]).encode()).hexdigest()
+    package = f"{source.stem}_{digest[:12]}"
     with (
         TemporaryDirectory(prefix="cosim-build-") as folder,
         TemporaryDirectory(prefix="cosim-build-") as target,

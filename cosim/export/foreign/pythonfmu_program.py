@@ -20,7 +20,8 @@ from pythonfmu.builder import FmuBuilder, get_model_class
 
 #: entry of the FMU; it makes its folder a package (see `python_class`)
 _ENTRY = """\
-\"\"\"Entry of the FMU, written by cosim: its folder as a package, and the class with a log of its exceptions.\"\"\"
+\"\"\"Entry of the FMU, written by cosim: its folder as a package, and the class with a \
+log of its exceptions.\"\"\"
 
 import os
 
@@ -33,7 +34,10 @@ from .slave_protection import load_class
 
 
 def main(folder: Path, package: str, source: str, target: Path, class_name: str = "") -> None:
-    """Write the entry module for the named class, or the one that PythonFMU selects, then the FMU."""
+    """Write the entry module for the class, then the FMU.
+
+    It is the named class, or the one that PythonFMU selects.
+    """
     sys.dont_write_bytecode = True
     sys.path.insert(0, str(folder))
     namespace = ModuleType(package)

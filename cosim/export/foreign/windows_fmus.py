@@ -61,13 +61,14 @@ def find_windows_compiler() -> list[str]:
 
 
 def windows_fmu(file: FmuFile) -> Path:
-    """Return a copy of an FMU that also has a library for this machine, which runs the FMU's DLL under Wine.
+    """Return a copy of an FMU with a library for this machine that runs its DLL under Wine.
 
     Args:
         file: The FMU, which has a DLL for 64-bit Windows.
 
     Raises:
-        InputError: Wine or a compiler is missing, or the DLL does not export the functions that the importer calls.
+        InputError: Wine or a compiler is missing, or the DLL does not export the functions that the
+            importer calls.
     """
     wine = find_wine()
     if not wine:

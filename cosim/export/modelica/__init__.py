@@ -3,35 +3,43 @@
 The package rumoca parses, checks and flattens a model. The order of computation and the C code are
 generated here.
 
-| Folder       | Modules                                                                                                    |
-| ------------ | ---------------------------------------------------------------------------------------------------------- |
-| `frontend/`  | `rumoca_frontend`: flatten a model with rumoca; `libraries`: find the libraries that it uses; `sources`:   |
-|              | files and locations; `messages`: those of rumoca; `parts`, `library_search`: places of errors;             |
-|              | `unsupported_operators`: their messages; `declared_models`: models of a file; `used_files`: files that a   |
-|              | model needs; `termination`: terminate() in algorithms; `flat_cache`: keep flat models; `rumoca_client`,    |
-|              | `rumoca_process`: run rumoca in a child process; `reader`                                                  |
-|              | (`expression_reader`, `statement_reader`, `unrolling`): convert its JSON to the flat model; `constants`:   |
-|              | structural parameters and constants become literals; `folded_branches`: find the parameters with which     |
-|              | rumoca has selected equations; `strings`: String arguments become literals; `openmodelica`: export with    |
-|              | OpenModelica instead                                                                                       |
-| `model/`     | `flat_model`, `syntax_tree`: the data structure; `traversal`; `text`: Modelica text of expressions;        |
-|              | `evaluate`, `arithmetic`: evaluation in Python                                                             |
-| `causality/` | `clocked_partitions` (`clock_inference`, `jumps`): replace clocked equations by sampled ones;              |
-|              | `continuous_states`: replace der(x) by a variable; `dependent_states`: derivatives of other variables;     |
-|              | `hybrid`: variables for pre(), relations and delay(); `continuous_equations`: solve the equations, with    |
-|              | `matching` if each has a variable alone on one side, else with `equation_systems` (`scalar_equations`,     |
-|              | `assignment`, `differentiation`); `when_conditions`: clocks and edge detectors; `topological_sort`;        |
-|              | `schedule` (`nodes`, `between_events`): the order of computation; `event_limits`: endless events;          |
-|              | `parameter_roles`: which parameters can be set; `interpreter`, `hybrid_interpreter` (`past_values`,        |
-|              | `dormand_prince`): simulation of a model in Python                                                         |
-| `c_code/`    | `emit`: the files; `model_code`: model.c; `hybrid_code`, `event_code`: model.c with event iteration;        |
-|              | `header`: model.h; `model_step`: clock ticks and integration; `exchange_code`: Model Exchange;             |
-|              | `functions`, `statements`, `expressions`, `subscripts`, `builtin_functions`, `lowering`, `c_values`,       |
-|              | `formatting`: parts of model.c                                                                             |
-| `external/`  | `sources`: C files of external functions; `calls`: C functions that call them; `library`: evaluation in     |
-|              | Python; `external.c`: errors, messages, Strings and external objects                                       |
-| (here)       | `assemble`: a Modelica file to a block, with the FMI variables; `units`: their units; `imbalance`: names  |
-|              | in messages about unbalanced models                                                                        |
+`frontend/`: from text to the flat model
+
+- `rumoca_frontend`, `rumoca_client`, `rumoca_process`: flatten a model with rumoca in a child
+  process, with a cache; `libraries`, `model_files`: the libraries and files that it needs
+- `reader` (`expression_reader`, `statement_reader`): convert its JSON to the flat model
+- `constants`: structural parameters, constants and Strings become literals; `folded_branches`: find
+  the parameters with which rumoca has selected equations
+- `messages`, `class_search`: messages of rumoca with places
+
+`model/`: the flat model
+
+- `flat_model`, `syntax_tree`, `scalars`, `traversal`, `simplification`: the data structure
+- `builtin_functions`: one row for each built-in function of Modelica
+- `evaluate`, `arithmetic`: evaluation in Python
+
+`causality/`: from equations to the order of computation
+
+- `clocked_partitions` (`clock_inference`): replace clocked equations by sampled ones
+- `continuous_states` (`differentiation`): replace der(x) by a variable, and reduce the index
+- `hybrid`: variables for pre(), relations and delay() in models with event iteration
+- `continuous_equations`: solve the equations that have a variable alone on one side, and all others
+  with `equation_systems` (`scalar_equations`, `matching`)
+- `schedule` (`dependency_graph`, `when_conditions`): the order of computation
+- `analysed_model`: the result, with roles and default values of parameters
+
+`c_code/`: from the analysed model to C
+
+- `model_code` (`hybrid_code`, `model_step`, `exchange_code`): model.c; `header`: model.h
+- `functions`, `statements`, `expressions`, `builtin_functions`, `lowering`, `c_values`: parts of
+  model.c
+
+`external/`: C code of external functions
+
+- `c_files`: their files, and C functions that call them; `shared_library`: evaluation in Python;
+  `external.c`: errors, messages, Strings and external objects
+
+Here: `assemble`: a Modelica file to a block; `fmi_variables`: its FMI variables and units.
 
 Sampled models, in a communication step from t to t + h:
 

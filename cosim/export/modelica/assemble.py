@@ -1,4 +1,9 @@
-"""Compilation of a Modelica file to a block."""
+"""Compilation of a Modelica file to a block.
+
+Of an unbalanced model the front end only counts the equations. Its counts agree for the model with
+as many equations `time = time`, or variables, as are missing. The matching of this model then shows
+which variables no equation determines, or which equations contradict others.
+"""
 
 from __future__ import annotations
 
@@ -169,7 +174,10 @@ def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> Ana
 
 
 def _without_unused_connectors(model: Model) -> Model:
-    """Return the model without the variables of its components that occur nowhere, as in expandable connectors."""
+    """Return the model without the variables of its components that occur nowhere.
+
+    Expandable connectors have such variables.
+    """
     used = variable_names(
         (model.equations, model.whens, model.algorithms, model.asserts, model.initial_equations)
     )
@@ -223,7 +231,7 @@ _ADDED = "cosimAdded"
 
 
 def explain_imbalance(error: InputError, analyse: Callable[[str], object]) -> InputError:
-    """Return the error of a model with the names of variables and equations in messages about an unbalanced model.
+    """Return an error that names the variables and equations of an unbalanced model.
 
     Args:
         error: The error.

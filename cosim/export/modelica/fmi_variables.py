@@ -22,7 +22,9 @@ FmiRole = tuple[Causality, Variability]
 
 
 def check_units(variables: Sequence[tuple[Variable, FmiRole]]) -> set[str]:
-    """Return the unknown units, for example "dB", which the FMU cannot state, and log a warning of each.
+    """Return the unknown units, for example "dB", and log a warning of each.
+
+    The FMU cannot state them.
 
     Args:
         variables: The FMI variables with their roles.
@@ -85,11 +87,11 @@ def block_variables(analysed: AnalysedModel) -> list[BlockVariable]:
 
 
 def _fmi_role(variable: Variable, analysed: AnalysedModel) -> FmiRole | None:
-    """Return causality and variability of a variable in the FMU, or None if the FMU does not contain it.
+    """Return causality and variability of a variable, or None if the FMU lacks it.
 
-    The FMU contains the inputs and outputs of the model itself, and all parameters that are neither protected nor set by a
-    modifier. Structural parameters are constants. The FMU of a model with states, event iteration or a library contains all
-    other variables too.
+    The FMU contains the inputs and outputs of the model itself, and all parameters that are neither
+    protected nor set by a modifier. Structural parameters are constants. The FMU of a model with
+    states, event iteration or a library contains all other variables too.
     """
     roles = analysed.parameter_roles
     if variable.type == "ExternalObject":

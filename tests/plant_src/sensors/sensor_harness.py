@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -82,10 +83,9 @@ class SensorHarness:
 
 def _ports(component: SignalComponent, causality: str) -> Ports:
     variables = [v for v in component.variables if v.causality == causality]
-    sizes = {
-        dtype: sum(len(v.scalar_names) for v in variables if v.dtype == dtype)
-        for dtype in {v.dtype for v in variables}
-    }
+    sizes = Counter[Any]()
+    for variable in variables:
+        sizes[variable.dtype] += len(variable.scalar_names)
     return Ports(variables, {dtype: np.zeros(size, dtype) for dtype, size in sizes.items()})
 
 

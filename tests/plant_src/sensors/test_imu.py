@@ -2,6 +2,8 @@
 variance.
 """
 
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -13,11 +15,8 @@ from plant_src.sensors.imu import Imu
 AXES = [*(f"acceleration.{axis}" for axis in "xyz"), *(f"rates.{axis}" for axis in "pqr")]
 KINDS = ("gyroscope", "accelerometer")
 ALLAN = "theory of the Allan variance"
-EXACT = {
-    f"{kind}__{what}": 0.0
-    for kind in KINDS
-    for what in ("noise_density", "bias_walk", "turn_on_bias")
-}
+_ERRORS = product(KINDS, ("noise_density", "bias_walk", "turn_on_bias"))
+EXACT = {f"{kind}__{what}": 0.0 for kind, what in _ERRORS}
 
 
 def exact_imu(**parameters):

@@ -1,5 +1,7 @@
 """Pictures of the onboard camera: positions of objects in them and times of the files."""
 
+from itertools import product
+
 import matplotlib.image
 import numpy as np
 import pytest
@@ -59,7 +61,7 @@ def test_a_deck_is_where_a_pinhole_camera_sees_it(camera, tilt):
     found = changed(camera(platforms={"deck": deck}, **pose), camera(**pose))
     ahead, right = np.array([np.sin(tilt), 0, -np.cos(tilt)]), np.array([0, -1.0, 0])
     axes = np.stack([right, np.cross(ahead, right), ahead])
-    corners = np.array([[x, y, 0.5] for x in (0.6, 1.4) for y in (-0.4, 0.9)])
+    corners = np.array([*product((0.6, 1.4), (-0.4, 0.9), (0.5,))])
     seen = axes @ (attitude.inv().apply(corners - position) - (0.1, 0, -0.05)).T
     pixels = FOCAL * seen[:2] / seen[2] + np.array([[WIDTH / 2], [HEIGHT / 2]])
     low, high = np.maximum(pixels.min(axis=1), 0), np.minimum(pixels.max(axis=1), (WIDTH, HEIGHT))

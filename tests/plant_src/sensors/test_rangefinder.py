@@ -144,10 +144,9 @@ def test_distance_to_the_deck_agrees_with_the_world(sensor, vehicle, motion):
         "plant", {"usv": {"model": vehicle, "motion": motion, "position": [3.0, -2.0], "yaw": 0.6}}
     )
     try:
-        pose = {
-            f"usv.{name}": [world.get(f"usv.{name}.{axis}") for axis in axes]
-            for name, axes in POSE.items()
-        }
+        pose = {}
+        for name, axes in POSE.items():
+            pose[f"usv.{name}"] = [world.get(f"usv.{name}.{axis}") for axis in axes]
         deck = np.array([world.get(f"usv.deck.position.{axis}") for axis in "xyz"])
     finally:
         world.free()

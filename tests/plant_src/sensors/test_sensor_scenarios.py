@@ -50,10 +50,11 @@ def test_a_rotor_with_four_tenths_of_its_thrust_is_a_crash():
 
 
 def test_another_seed_is_another_flight_and_the_same_seed_the_same():
-    runs = [
-        cosim.run("landing_on_sensors", {"measured.seed": seed}, stop_time=2) for seed in (5, 5, 6)
-    ]
-    first, same, other = (np.stack([result[name] for name in result]).tobytes() for result in runs)
+    flights = []
+    for seed in (5, 5, 6):
+        result = cosim.run("landing_on_sensors", {"measured.seed": seed}, stop_time=2)
+        flights.append(np.stack([result[name] for name in result]).tobytes())
+    first, same, other = flights
     assert first == same != other
 
 

@@ -156,7 +156,7 @@ def test_water_carries_a_vessel_along_sideways(
 def test_wind_pushes_as_hard_as_the_same_speed_through_still_air(
     motion: str, measured: MeasurementCheck
 ) -> None:
-    """At rest in a wind of 4 m/s the thrust balances the drag at 4 m/s, 0.1 kg/m times its square."""
+    """At rest in a wind of 4 m/s the thrust balances the drag, 0.1 kg/m times its square."""
     trial = WorldHarness(
         {"usv": vessel_settings([0.0, 0.0], motion=motion)},
         environment={"wind": {"velocity": [4.0, 0.0, 0.0]}},

@@ -15,7 +15,9 @@ from plant_src.vehicles.multirotor.equations import MultirotorEquations
 CRAZYFLIE, HEXACOPTER = VEHICLES["crazyflie"], VEHICLES["survey_hexacopter"]
 IMAGES = "Sanchez-Cuevas et al. 2017"
 HIGH = {"initial.position.z": 100.0}
-NO_DRAG = {f"{kind}_drag.{axis}": 0.0 for kind in ("rotor", "body") for axis in "xyz"}
+NO_DRAG = {f"rotor_drag.{axis}": 0.0 for axis in "xyz"} | {
+    f"body_drag.{axis}": 0.0 for axis in "xyz"
+}
 STILL = {**HIGH, **NO_DRAG, "ground_effect": 0.0, "rotor_inertia": 0.0}
 
 

@@ -122,7 +122,7 @@ def test_flight_with_all_effects(name: str, measured: MeasurementCheck) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("name", VEHICLES)
 def test_a_minute_within_the_limits(name: str, measured: MeasurementCheck) -> None:
-    """Without saturated motors, and without the limit of the ground effect very near to the ground."""
+    """Without saturated motors and the limit of the ground effect very near to the ground."""
     found, expected = fly(name, 600, within_limits=True)
     error = np.linalg.norm(found[:, :3] - expected[:, :3], axis=1)
     measured(

@@ -291,7 +291,7 @@ def test_crazyflie_thrust(measured, turns: int, grams: float) -> None:
 
 @pytest.mark.parametrize("angle", [10, 20, 30])
 def test_cybership_turns_by_its_rudders(measured, angle: int) -> None:
-    """Yaw acceleration at 0.5 m/s without thrust, from the inertia matrix and the identified lift."""
+    """Yaw acceleration at 0.5 m/s without thrust, from inertia matrix and identified lift."""
     delta, u, lever = np.radians(angle), 0.5, 0.549
     inertia = np.array([[33.8, 23.8 * 0.046], [23.8 * 0.046, 2.76]])
     lift = 2 * (6.43306 * delta - 5.83594 * delta**2) * u**2  # of both rudders

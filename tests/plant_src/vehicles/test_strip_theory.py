@@ -99,7 +99,7 @@ def test_exciting_force_and_moment_in_beam_waves(
 
 @pytest.mark.parametrize("period", [0.8, 1.0, 1.25, 2.0])
 def test_response_in_beam_waves(period: float, measured: MeasurementCheck) -> None:
-    """Pressure that accelerates the water included, through the linear mass, damping and stiffness."""
+    """With the pressure that accelerates the water, by linear mass, damping and stiffness."""
     waves = regular_waves(period)
     w, k, b = waves.frequency[0], waves.wave_number[0], OFFSET
     heave, roll = response(waves, period)
@@ -326,7 +326,7 @@ def michell_resistance(speed: float) -> float:
 
 
 def test_a_current_from_ahead_carries_it_along(measured: MeasurementCheck) -> None:
-    """The relative velocity decays by friction and residuary resistance; still air holds it back."""
+    """The relative velocity decays by the resistance; still air holds it back."""
     reference = Catamaran()
     solution = solve_ivp(
         lambda _, u: (reference.resistance(u[0] - 0.4) - 0.1 * u[0] * abs(u[0])) / MASS,

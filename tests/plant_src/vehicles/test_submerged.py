@@ -34,8 +34,8 @@ MASS, VOLUME, CENTRE_OF_BUOYANCY, HEIGHT, GRAVITY, SALT_WATER = (
     1025.0,
 )
 NEUTRAL = {"displaced_volume": MASS / SALT_WATER, "centre_of_buoyancy.z": 0.0}
-UNDAMPED = {
-    f"{name}_damping[{i},{i}]": 0.0 for name in ("linear", "quadratic") for i in range(1, 7)
+UNDAMPED = {f"linear_damping[{i},{i}]": 0.0 for i in range(1, 7)} | {
+    f"quadratic_damping[{i},{i}]": 0.0 for i in range(1, 7)
 }
 
 
@@ -93,7 +93,8 @@ def test_four_thrusters_drive_it_at_the_speed_of_their_thrust(
     force = 4 * 3.8e-4 * 200.0**2 * np.sqrt(0.5)
     speed = terminal_speed(force, 13.7 + 4 * advance * 200.0 / 2, 141.0)
     found = sense * fmu.get("velocity_body.u").item()
-    case = "with inflow" if advance else "forward" if sense > 0 else "reverse"
+    case = "forward" if sense > 0 else "reverse"
+    case = "with inflow" if advance else case
     measured(
         MODEL,
         "speed by four thrusters",
@@ -143,10 +144,8 @@ def test_tumbling_without_damping_keeps_the_energy(measured: MeasurementCheck) -
         [13.5 + 6.36, 13.5 + 7.12, 13.5 + 18.68, 0.26 + 0.189, 0.23 + 0.135, 0.37 + 0.222]
     )
     start = np.array([0.4, -0.3, 0.2, 1.0, -2.0, 1.5])
-    names = [
-        f"initial.{name}"
-        for name in (*(f"velocity_body.{a}" for a in "uvw"), *(f"rates.{a}" for a in "pqr"))
-    ]
+    names = [f"initial.velocity_body.{axis}" for axis in "uvw"]
+    names += [f"initial.rates.{axis}" for axis in "pqr"]
     fmu = deep({**NEUTRAL, **UNDAMPED, **dict(zip(names, start, strict=True))})
     fmu.step(0.01, 2000)
     end = np.concatenate([fmu.vector("velocity_body", "uvw"), fmu.vector("rates", "pqr")])
@@ -369,7 +368,8 @@ def simulated(start: np.ndarray, duration: float, step: float, strength: float =
     )
     for speeds, loads, current in sequence(duration, strength):
         fmu.set({f"thruster_speed[{k}]": value for k, value in enumerate(speeds, 1)})
-        kinds = [f"external_{kind}.{axis}" for kind in ("force", "torque") for axis in "xyz"]
+        kinds = [f"external_force.{axis}" for axis in "xyz"]
+        kinds += [f"external_torque.{axis}" for axis in "xyz"]
         fmu.set(dict(zip((*kinds, "current.x", "current.y"), (*loads, *current), strict=True)))
         fmu.step(step, round(1 / step))
         places.append(fmu.vector("position"))

@@ -109,9 +109,9 @@ def test_a_vessel_rests_runs_straight_and_turns(name: str) -> None:
 
 def quantities(data: Any) -> Any:
     """Yield all quantities with a unit."""
-    for value in (
-        data.values() if isinstance(data, dict) else data if isinstance(data, list) else ()
-    ):
+    if isinstance(data, dict):
+        data = list(data.values())
+    for value in data if isinstance(data, list) else ():
         if isinstance(value, dict) and "value" in value:
             yield value
         yield from quantities(value)

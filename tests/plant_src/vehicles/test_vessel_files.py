@@ -55,11 +55,11 @@ def test_the_strider_as_data_moves_like_the_strider(motion: str, data: dict[str,
             [thrust**0.5],
             [rudder],
         )
-        own, other = (
-            [trial[f"usv.{name}"] for name in MOTION]
-            for trial in trials.values()
-            if trial.step(100)
-        )
+        motions = []
+        for trial in trials.values():
+            trial.step(100)
+            motions.append([trial[f"usv.{name}"] for name in MOTION])
+        own, other = motions
         assert other == pytest.approx(own, abs=1e-9)
     assert np.hypot(*own[:2]) > 5
     assert not trials["own"]["usv.crashed"]
@@ -98,6 +98,13 @@ def changed(change: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
     return data
 
 
+def coupled(sway_by_yaw: float, yaw_by_sway: float) -> list[list[float]]:
+    """Added mass with 80 in sway and yaw that the elements outside of the diagonal couple."""
+    matrix = np.diag([5.0, 80.0, 55.0, 2.0, 11.0, 80.0])
+    matrix[1, 5], matrix[5, 1] = sway_by_yaw, yaw_by_sway
+    return matrix.tolist()
+
+
 FAULTS: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
     (lambda d: d.pop("hull"), r'model: "hull" is missing'),
     (
@@ -123,6 +130,22 @@ FAULTS: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
         r"model\.centre_of_mass: found 3\.8469 m ahead of .*: the vessel capsizes",
     ),
     (lambda d: d.update(added_mass=[-1] * 6), r"model\.added_mass: found the eigenvalue -1"),
+    (
+        lambda d: d.update(added_mass=[5, 80, 55, 2, -0.5, 24]),
+        r"model\.added_mass: found the eigenvalue -0\.5, expected none below 0",
+    ),
+    (
+        lambda d: d.update(added_mass=coupled(85.0, 85.0)),
+        r"model\.added_mass: found the eigenvalue -5, expected none below 0",
+    ),
+    (
+        lambda d: d.update(added_mass=coupled(10.0, 9.0)),
+        r"model\.added_mass: expected a symmetric matrix",
+    ),
+    (
+        lambda d: d.update(coriolis_added_mass=coupled(10.0, 9.0)),
+        r"model\.coriolis_added_mass: expected a symmetric matrix",
+    ),
     (
         lambda d: d.update(linear_damping=[-1] + [0] * 5),
         r"model\.linear_damping: found the diagonal",
@@ -158,6 +181,14 @@ FAULTS: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
         r"model\.rudders\.0\.area: found 0, expected a number greater",
     ),
 ]
+
+
+@pytest.mark.parametrize("coupling", [79.9, 80.0])
+def test_added_mass_may_be_coupled_and_singular(coupling: float) -> None:
+    data = changed(lambda d: d.update(added_mass=coupled(coupling, coupling)))
+    boat = model_from_data(data).boat
+    assert boat is not None
+    assert boat.added_mass[1, 5] == coupling
 
 
 @pytest.mark.parametrize(("change", "text"), FAULTS)

@@ -48,27 +48,23 @@ VESSELS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     ),
 }
 MOTION = [
-    f"{group}.{axis}"
-    for group, axes in {
-        "position": "xyz",
-        "orientation": "wxyz",
-        "velocity": "xyz",
-        "rates": "pqr",
-        "deck.position": "xyz",
-    }.items()
-    for axis in axes
+    *(f"position.{axis}" for axis in "xyz"),
+    *(f"orientation.{axis}" for axis in "wxyz"),
+    *(f"velocity.{axis}" for axis in "xyz"),
+    *(f"rates.{axis}" for axis in "pqr"),
+    *(f"deck.position.{axis}" for axis in "xyz"),
 ]
 
 
 def scalars(values: dict[str, Any]) -> dict[str, float]:
     """Replace lists by scalars "name[1]", "name[2]"."""
-    lists = {
-        f"{name}[{k}]": x
-        for name, xs in values.items()
-        if isinstance(xs, list)
-        for k, x in enumerate(xs, 1)
-    }
-    return {name: x for name, x in values.items() if not isinstance(x, list)} | lists
+    scalar = dict[str, float]()
+    for name, value in values.items():
+        if isinstance(value, list):
+            scalar |= {f"{name}[{k}]": x for k, x in enumerate(value, 1)}
+        else:
+            scalar[name] = value
+    return scalar
 
 
 def parameters(model: str) -> dict[str, Any]:

@@ -62,7 +62,7 @@ class BuiltinLowering(Lowering):
         return map_elements(value, "Integer", lambda x: c_call("absolute", "m", x))
 
     def _lower_integer(self, node: Builtin) -> CValue:
-        """Lower integer(x), the largest Integer not above x, and Integer(e), the number of an enumeration literal."""
+        """Lower integer(x) of a Real x, and Integer(e), the number of an enumeration literal."""
         value = self.lower(node.arguments[0])
         return map_elements(
             value,

@@ -229,7 +229,10 @@ class ExpressionLowering(BuiltinLowering):
         )
 
     def known_branch(self, node: If) -> Expression | None:
-        """Return the value of an if-expression without the branches before it, if the first condition is constant, else None."""
+        """Return an if-expression without its first condition if that is constant, else None.
+
+        It is the value of the first branch, or the expression without this branch.
+        """
         condition, value = node.branches[0]
         known = self.static_value(condition)
         if known is None:

@@ -165,7 +165,9 @@ class FunctionTranslator:
 
 
 def _with_sizes(function: Function, numbers: tuple[int | None, ...]) -> tuple[Function, Sizes]:
-    """Insert the values of constant Integer arguments that determine sizes, here or in functions that it calls.
+    """Insert the values of constant Integer arguments that determine sizes.
+
+    The sizes are those of the function, or of functions that it calls.
 
     Returns:
         The function, and the names and values of these arguments.
@@ -238,7 +240,7 @@ def _function_text(
 def _opening_lines(
     function: Function, instance: FunctionInstance, local_values: list[CValue], body: list[str]
 ) -> list[str]:
-    """Return the declarations, and `(void)` statements for variables that C compilers would report as unused."""
+    """Return the declarations, and `(void)` statements for unused variables."""
     lines = [
         _declaration(output) if instance.returns_scalar or not output.shape else _zero_fill(output)
         for output in instance.outputs

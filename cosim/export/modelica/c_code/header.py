@@ -177,7 +177,10 @@ class HeaderWriter:
 
 
 def has_messages(model: Model) -> bool:
-    """Return whether a model has messages that are composed at run time, warnings, or external functions that may log them."""
+    """Return whether a model has warnings or messages that are composed at run time.
+
+    External functions may log such messages.
+    """
     return bool(composed_asserts(_asserts(model))) or any(
         f.external for f in model.functions.values()
     )
@@ -200,5 +203,5 @@ def _member_comment(variable: Variable) -> str:
 
 
 def escape_comment(text: str) -> str:
-    """Return a text on one line, with comment delimiters separated so that it can be part of a C comment."""
+    """Return a text on one line and without comment delimiters, for a C comment."""
     return " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())

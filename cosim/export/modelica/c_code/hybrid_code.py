@@ -77,7 +77,7 @@ class HybridCode(ModelCode):
         ]
 
     def _endless_codes(self) -> dict[str, str]:
-        """Return the failure code of an event iteration that does not end by the variable that changes."""
+        """Return variable -> failure code of an event iteration that it does not let end."""
         hybrid, variables = self.model.hybrid, self.model.variables
         assert hybrid
         names = iterated_names(hybrid)

@@ -1,4 +1,4 @@
-"""Base of the lowering to C: scope, statements, temporary variables, static evaluation, subscripts."""
+"""Base of the lowering to C: scope, temporary variables, static evaluation, subscripts."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ class Lowering:
 
     @contextmanager
     def collect_lines(self) -> Iterator[list[str]]:
-        """Collect the statements that are generated in this block in a separate list, indented by one level."""
+        """Collect the statements of this block in a separate list, indented by one level."""
         outer, self.lines = self.lines, []
         yield self.lines
         inner, self.lines = self.lines, outer
@@ -282,7 +282,7 @@ class Lowering:
         label: str,
         where: SourceLocation | None,
     ) -> list[int] | int | str:
-        """Return the offset (from 0) of an element as a number or C code, or the offsets of a slice as a list."""
+        """Return the offset (from 0) of an element, a number or C code, or a list for a slice."""
         if isinstance(subscript, Colon):
             return list(range(size))
         if isinstance(subscript, Range):

@@ -284,7 +284,7 @@ class ModelCode:
     # continuous states
 
     def _continuous(self) -> list[str]:
-        """Generate the functions `derivatives` and `advance` (integration) of a model with continuous states."""
+        """Generate `derivatives` and `advance`, the integration of a model with states."""
         if not self.model.states:
             return []
         lines = self._body(self.schedule.between.derivatives, initial=False)

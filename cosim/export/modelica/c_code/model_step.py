@@ -1,7 +1,4 @@
-"""Code generation of model_step.
-
-The events of a communication step and the integration of continuous states between them.
-"""
+"""Code generation of model_step: events in a communication step, and integration between them."""
 
 from __future__ import annotations
 

@@ -199,7 +199,7 @@ class StatementLowering(ExpressionLowering):
         self.lines.append(f"if (!{condition.parenthesized(13)}) fail(m, {failure});")
 
     def _composed_assert(self, node: Assert) -> None:
-        """Lower an assertion whose message contains values, whose level is warning, or which is a `terminate`."""
+        """Lower a warning, a `terminate`, or an assertion whose message contains values."""
         condition = self.scalar_of(node.condition).parenthesized(13)
         with self.collect_lines() as lines:
             texts, values = zip(*map(self._message_part, node.message), strict=True)
@@ -221,7 +221,7 @@ class StatementLowering(ExpressionLowering):
             self.lines += [f"if (!{condition}) {{", *lines, "}"]
 
     def _message_part(self, part: Expression) -> tuple[str, str]:
-        """Return the format of a part of a message and the C expression of its value, "" for a literal."""
+        """Return the format and the C expression of a part of a message, "" for a literal."""
         if isinstance(part, Literal):
             return str(part.value).replace("%", "%%"), ""
         value = self.lower(part)
@@ -305,7 +305,7 @@ def _variables_read(node: Expression) -> set[str]:
 
 
 def _is_one_if(lines: list[str]) -> bool:
-    """Return whether the lines are one if-statement, which begins in the first line and ends in the last one."""
+    """Return whether the lines are one if-statement."""
     return (
         lines[0].startswith("    if (")
         and lines[0].endswith("{")

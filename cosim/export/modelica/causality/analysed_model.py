@@ -1,4 +1,4 @@
-"""Result of the analysis of a model: its schedule, the roles of its parameters and its default values."""
+"""Result of the analysis of a model: schedule, roles of parameters, default values."""
 
 from __future__ import annotations
 
@@ -139,7 +139,10 @@ class AnalysedModel:
             self.assign(name, self.evaluate(declared_value(self.model, name)))
 
     def apply_start_values(self, inputs: bool) -> None:
-        """Set all variables that are not parameters to their start values; inputs only if `inputs`."""
+        """Set all variables but parameters to their start values.
+
+        Inputs are only set if `inputs` is true.
+        """
         for variable in self.model.variables.values():
             if variable.variability not in ("parameter", "constant") and (
                 inputs or not is_input(variable)

@@ -1,8 +1,11 @@
-"""Inference of the clocks of clocked equations (`Clock`, `sample(u, c)`, `hold()`, `previous()`, `subSample()`, ...).
+"""Inference of the clocks of clocked equations (`Clock`, `sample(u, c)`, `hold()`, `previous()`).
 
-Variables of one equation have the same clock, unless an operator separates them: the argument of `hold()` or `sample()` belongs
-to another partition, and the argument of `subSample()`, `superSample()`, `shiftSample()` or `backSample()` has a clock in a known
-ratio to that of the equation. Constructors `Clock(...)` and these ratios determine all clocks.
+Variables of one equation have the same clock, unless an operator separates them: the argument of
+`hold()` or `sample()` belongs to another partition, and the argument of `subSample()`,
+`superSample()`, `shiftSample()` or `backSample()` has a clock in a known ratio to that of the
+equation (Modelica Language Specification 3.6, section 16.7). Equal clocks are merged with a
+union-find structure (Tarjan 1975). Constructors `Clock(...)` give the clock of some partitions; the
+ratios, exact fractions, carry it to all others until nothing changes.
 """
 
 from __future__ import annotations
@@ -70,7 +73,10 @@ def is_clock(expression: Any, model: Model) -> bool:
 
 
 def is_sampler(call: Builtin, model: Model) -> bool:
-    """Return whether a call is `sample(u)` or `sample(u, clock)`, and not the event `sample(start, period)`."""
+    """Return whether a call is `sample(u)` or `sample(u, clock)`.
+
+    `sample(start, period)` is an event.
+    """
     return call.name == "sample" and (
         len(call.arguments) == 1 or is_clock(call.arguments[1], model)
     )
@@ -127,7 +133,7 @@ class ClockInference:
         self._refuse_continuous()
 
     def items(self) -> Iterator[tuple[str, Any]]:
-        """Yield all equations, when-clauses, algorithms and assertions with the names of their nodes."""
+        """Yield the names of the nodes and the items of all sections."""
         for section in EVENT_SECTIONS:
             for number, item in enumerate(getattr(self._model, section)):
                 yield f"{section} {number}", item

@@ -320,7 +320,7 @@ class JumpSearch:
                 self._equations.setdefault(name, []).append(equation)
 
     def may_jump(self, expression: Expression) -> bool:
-        """Return whether the value of an expression can jump at an event that is not a change of an input."""
+        """Return whether an expression can jump at an event other than a change of an input."""
         return any(self._jumps(tree) for tree in self._dependences(expression))
 
     def is_held(self, expression: Expression) -> bool:

@@ -1,4 +1,13 @@
-"""Continuous states: variables for der(x), and index reduction of the states that equations determine."""
+"""Continuous states: variables in place of der(x), and index reduction.
+
+A variable in der() that an equation determines, for example the input of a derivative block, is not
+a continuous state: its initial value cannot be chosen. The equation that determines it is
+differentiated with respect to time, and so are the equations that determine the variables therein
+(Pantelides 1988). der(x) then becomes an ordinary variable, the dummy derivative, which the
+differentiated equation determines (Mattsson and Soederlind 1993). The matching chooses the variable
+that is no state: it assigns states to equations only where no other unknown is left. The choice
+is made once, so a constraint between states must be linear in this variable.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +47,7 @@ from .equation_systems import EquationSystem
 
 
 def introduce_derivatives(model: Model) -> Model:
-    """Return the model with its continuous states, and with variables for their derivatives instead of der().
+    """Return the model with its continuous states, and with variables in place of der().
 
     Raises:
         InputError: The argument of der() is not a continuous Real variable.
@@ -184,7 +193,7 @@ class _Reduction:
         )
 
     def _refuse_nonlinear_constraints(self, dependent: set[ScalarKey]) -> None:
-        """Raise InputError if an equation between states cannot be solved for one of them at all times."""
+        """Raise InputError for an equation between states that has no solution at all times."""
         for key in sorted(dependent):
             equation = self._equation_of[key]
             names = variable_names((equation.left, equation.right)) & set(self._model.states)

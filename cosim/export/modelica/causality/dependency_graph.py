@@ -1,4 +1,8 @@
-"""Dependency graph of statements: nodes with the scalars that they read and write, and their order."""
+"""Dependency graph of statements: nodes with the scalars that they read and write.
+
+A statement follows all statements that write what it reads. The topological order (Kahn 1962)
+prefers nodes that continue the previous one, so that the C code keeps components together.
+"""
 
 from __future__ import annotations
 
@@ -134,7 +138,10 @@ def _raise_algebraic_loop(remaining: list[Node], dependencies: dict[Node, set[No
 
 
 def _mergeable(first: Body, second: Body) -> bool:
-    """Return whether both are single if-statements on the same event flags, which are constant during an event."""
+    """Return whether both are single if-statements on the same event flags.
+
+    These flags are constant during an event.
+    """
     a, b = first[-1], second[0]
     if not (
         isinstance(a, IfStatement) and isinstance(b, IfStatement) and len(first) == len(second) == 1
@@ -182,7 +189,7 @@ def algorithm_nodes(
     translate_when: Callable[[When], Body],
     conditions: WhenConditions | None = None,
 ) -> Iterator[Node]:
-    """Yield one node for an algorithm with its when-clauses translated, or none if no statement remains.
+    """Yield the node of an algorithm with translated when-clauses, if a statement remains.
 
     With `conditions`, edge detectors that depend on the algorithm itself become part of it.
     """
@@ -202,7 +209,10 @@ def algorithm_nodes(
 
 
 def split_by_target(model: Model, statements: Body) -> Iterator[Node]:
-    """Yield one node for each variable that when-equations assign, since they have no order, and one for the assertions."""
+    """Yield one node for each variable that when-equations assign, and one for assertions.
+
+    When-equations have no order.
+    """
     for name in dict.fromkeys(
         referenced_variable(target) for target in assigned_references(statements)
     ):

@@ -1,4 +1,9 @@
-"""Symbolic differentiation of scalar expressions."""
+"""Symbolic differentiation of scalar expressions, for Jacobians and for index reduction.
+
+The rules of sums, products and powers are here, those of functions are in the table of built-in
+functions. `leaf` decides with respect to what an expression is differentiated. Calls of functions
+that consist of one assignment are expanded first.
+"""
 
 from __future__ import annotations
 
@@ -92,7 +97,7 @@ class Differentiation:
 
 
 def inline_call(call: Call, functions: Mapping[str, Function]) -> Expression | None:
-    """Return the value of a call of a function that consists of one assignment to a scalar result, else None."""
+    """Return the value of a call of a function with one assignment to a scalar, else None."""
     function = functions.get(call.function)
     if function is None or function.locals or len(function.outputs) != 1 or len(function.body) != 1:
         return None

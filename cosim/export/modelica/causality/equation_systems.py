@@ -1,6 +1,9 @@
-"""Causality of equations in any form.
+"""Causality of equations in any form: explicit solutions, and systems for algebraic loops.
 
-Matching of scalar equations, explicit solution, and systems for algebraic loops.
+The scalar equations are matched with unknowns and divided into components (`matching`). An equation
+that is linear in its only unknown is solved symbolically: with the residual r = a x + b, a = dr/dx
+does not contain x, and b is r at x = 0. All other components become systems for Newton's method
+with symbolic derivatives. Comparisons in a loop keep their values while the loop is solved.
 """
 
 from __future__ import annotations
@@ -190,7 +193,10 @@ class EquationSystem:
         return self._continued([self._scalar[number] for number in numbers], keys)
 
     def _continued(self, equations: Sequence[Equation], keys: Sequence[ScalarKey]) -> Solve | For:
-        """Return a system of equations, or the loop that solves it for a growing part of the actual expressions."""
+        """Return a system of equations, in a loop if it has homotopy().
+
+        The part of the actual expressions grows from iteration to iteration.
+        """
         if not (self.continues and has_builtin(tuple(equations), "homotopy")):
             return self._system(equations, keys)
         part = Binary("/", Name("continuation"), Literal(float(_CONTINUATION_STEPS), "Real"))

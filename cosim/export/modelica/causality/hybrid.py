@@ -12,6 +12,12 @@ equation determines `pre()` of a variable that equations determine. In such a mo
 - a value that floor(), ceil(), integer(), div(), mod() or rem() rounds becomes a variable, which a
   when-clause changes;
 - the argument of `delay()` becomes a variable, whose past values are stored.
+
+In an event all equations are evaluated with the values before it, then with the results in place of
+these, until no discrete variable changes (event iteration, Modelica Language Specification 3.6,
+section 8.6 and appendix B; Otter, Elmqvist and Mattsson, Hybrid modeling in Modelica based on the
+synchronous data flow principle, 1999). Between events comparisons keep their values, so that the
+integration sees smooth equations; a crossing of their operands is located and is the next event.
 """
 
 from __future__ import annotations
@@ -185,7 +191,10 @@ class _Preparation:
         return tuple(changed)
 
     def _in_algorithm(self, body: Body) -> Body:
-        """Return an algorithm whose when-clauses have located conditions, if it does not assign the compared variables itself."""
+        """Return an algorithm whose when-clauses have located conditions.
+
+        Comparisons of variables that the algorithm itself assigns remain.
+        """
         assigned = assigned_names(body)
 
         def change(node: Any) -> Any:
@@ -352,7 +361,7 @@ def iterated_names(hybrid: Hybrid) -> Sequence[str]:
 
 
 def endless_reason(hybrid: Hybrid, name: str) -> str:
-    """Return the message of an event iteration that does not end, because a variable changes in each evaluation."""
+    """Return the message of an event iteration in which a variable changes again and again."""
     condition = next(
         (to_text(relation.condition) for relation in hybrid.relations if relation.name == name),
         name,
@@ -361,7 +370,7 @@ def endless_reason(hybrid: Hybrid, name: str) -> str:
 
 
 def chattering_reason(relation: Relation) -> str:
-    """Return the message of too many events in a communication step, the last one by this relation."""
+    """Return the message of too many events in a step, the last one by this relation."""
     return (
         f"too many events in one step (chattering): {to_text(relation.condition)} changes again "
         "and again"

@@ -1,4 +1,13 @@
-"""Maximum matching of scalar equations and unknowns, and the strongly connected components of the matched system."""
+"""Maximum matching of equations and unknowns, and strongly connected components.
+
+Equations and unknowns are the two sides of a bipartite graph. A maximum matching assigns to each
+equation the unknown that it determines; augmenting paths extend a partial matching (Kuhn 1955).
+An equation depends on those that determine its other unknowns. The strongly connected components of
+this graph (Tarjan 1972) are the smallest systems that must be solved together, and their order is
+that of the solution: the block lower triangular form (Duff and Reid 1978; Cellier and Kofman,
+Continuous System Simulation, 2006, chapter 7). Systems are not torn: Newton's method iterates all
+unknowns of a component.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +55,11 @@ def _without(candidates: Sequence[Sequence[Key]], excluded: set[Key]) -> list[li
 
 
 def _match_in_sequence(candidates: Sequence[Sequence[Key]]) -> dict[int, Key]:
-    """Repeat: assign an unknown to the only equation that contains it, or an equation to its only free unknown."""
+    """Match the equations and unknowns that leave no choice, as long as there are some.
+
+    An unknown belongs to the only equation that contains it, and an equation to its only free
+    unknown.
+    """
     equations_of: dict[Key, set[int]] = {}
     for number, keys in enumerate(candidates):
         for key in keys:
@@ -111,7 +124,7 @@ def _flip(
 
 
 def strongly_connected_components(successors: Sequence[Collection[int]]) -> list[list[int]]:
-    """Return the strongly connected components of a graph in reverse topological order (Tarjan's algorithm)."""
+    """Return the strongly connected components of a graph, successors first."""
     index: dict[int, int] = {}
     low: dict[int, int] = {}
     stack: list[int] = []

@@ -239,7 +239,10 @@ def _total(terms: Sequence[Expression]) -> Expression:
 
 
 def _uncalled(functions: Mapping[str, Function]) -> dict[str, Function]:
-    """Return the functions with external ones that leave their outputs zero, since only the sizes matter."""
+    """Return the functions, of which external ones leave their outputs zero.
+
+    Only the sizes matter.
+    """
     return {
         name: replace(f, external=replace(f.external, library=None)) if f.external else f
         for name, f in functions.items()

@@ -131,7 +131,10 @@ def statements_between_events(
 
 
 def _varying(model: Model, order: Iterable[Node], sources: Iterable[str]) -> list[Node]:
-    """Return the sorted nodes whose values change between events, because they depend on the variables `sources` or on time."""
+    """Return the sorted nodes that depend on the variables `sources` or on the time.
+
+    Their values change between events.
+    """
     changing = scalars_of(model, sources)
     nodes = []
     for node in order:
@@ -181,7 +184,7 @@ def declared_value(model: Model, name: str) -> Expression:
 
 
 def pre_variables(model: Model, body: Body) -> list[str]:
-    """Return the variables of which the statements use the value before the event, in order of declaration."""
+    """Return the variables whose value before the event is used, as they are declared."""
     used = {
         referenced_variable(item.arguments[0])
         for item in walk(body)

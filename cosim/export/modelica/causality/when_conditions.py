@@ -102,7 +102,7 @@ class WhenConditions:
         return condition.elements if isinstance(condition, Array) else (condition,)
 
     def detectors_in(self, body: Body, assigned: Collection[str]) -> list[EdgeDetector]:
-        """Return the edge detectors of the statements whose conditions read variables that the same algorithm assigns.
+        """Return the edge detectors that read variables which the same algorithm assigns.
 
         They are evaluated in place, in the order of the algorithm.
         """

@@ -1,4 +1,8 @@
-"""C files of external functions: those that they include, and the generated calls."""
+"""C files of external functions: those that they include, and the generated calls.
+
+The generated file external_calls.c has one C function for each external function of a model, which
+reports errors by its result.
+"""
 
 from __future__ import annotations
 
@@ -71,7 +75,7 @@ def external_files(functions: Iterable[Function], packages: Mapping[str, Path]) 
 def external_archives(
     functions: Iterable[Function], packages: Mapping[str, Path]
 ) -> dict[str, Path]:
-    """Return the static libraries (file name -> file) of the Library annotations of external functions."""
+    """Return the static libraries (file name -> file) of Library annotations."""
     found: dict[str, Path] = {}
     for function in sorted(functions, key=lambda f: f.name):
         assert function.external
@@ -119,7 +123,10 @@ def _add_files(function: Function, packages: Mapping[str, Path], files: dict[str
 def _check_libraries(
     function: Function, packages: Mapping[str, Path], files: Mapping[str, str]
 ) -> None:
-    """Raise InputError if a function without Include annotation has libraries, but neither C code nor a static library."""
+    """Raise InputError if no file of a function's libraries is found.
+
+    A function with an Include annotation needs none.
+    """
     assert function.external
     libraries = function.external.libraries
     c_files = map("".join, product(libraries, (".c", ".h")))
@@ -360,7 +367,8 @@ def _call(signature: CallSignature) -> str:
             else f"a{k}"
         )
 
-    return f"{signature.function}({', '.join(passed(k, a) for k, a in enumerate(signature.arguments))})"
+    arguments = ", ".join(passed(k, a) for k, a in enumerate(signature.arguments))
+    return f"{signature.function}({arguments})"
 
 
 def _prototype(signature: CallSignature) -> str:

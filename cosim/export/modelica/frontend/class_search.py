@@ -1,4 +1,8 @@
-"""Search for classes in the text of Modelica files, for messages with a place."""
+"""Search for classes in the text of Modelica files, for messages with a place.
+
+The models that a file declares are listed if a model is not found. An operator that the front end
+refuses without a place is searched in the classes that a model uses, directly or indirectly.
+"""
 
 from __future__ import annotations
 
@@ -25,8 +29,10 @@ _MAX_LISTED = 6
 def declared_models(text: str) -> list[str]:
     """Return the full names of the models and blocks of a Modelica text that can be instantiated.
 
-    >>> declared_models("package P block A end A; partial block B end B; package Q model C = P.A; end Q; end P;")
+    >>> declared_models("package P block A end A; package Q model C = P.A; end Q; end P;")
     ['P.A', 'P.Q.C']
+    >>> declared_models("partial block B end B;")
+    []
     """
     enclosing = _within(text)
     models = []
@@ -130,7 +136,9 @@ def find_class(folder: Path, names: list[str]) -> tuple[SourceLocation, bool] | 
 
 
 def find_operator(word: str, code: str, packages: Mapping[str, Path]) -> SourceLocation | None:
-    """Return the first place of an operator in the classes that a text uses, the nearest classes first.
+    """Return the first place of an operator in the classes that a text uses.
+
+    The nearest classes come first.
 
     Args:
         word: The operator.

@@ -1,4 +1,8 @@
-"""Replacement of constants, structural parameters and Strings by literals."""
+"""Replacement of constants, structural parameters and Strings by literals.
+
+Literals can determine array sizes, slices and loop ranges. The FMU contains Strings as literals in
+calls of functions only.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +30,11 @@ _DISCRETE_TYPES = ("Integer", "Boolean", "Enumeration", "String")
 
 
 def fold_constants(model: Model) -> Model:
-    """Return the model with its scalar constants and structural parameters replaced by their values.
+    """Return the model with scalar constants and structural parameters as literals.
 
-    Structural parameters select equations, branches or sizes. Their declarations remain in the model. Protected and final
-    parameters of discrete types that depend on them only are replaced too.
+    Structural parameters select equations, branches or sizes. Their declarations remain in the
+    model. Protected and final parameters of discrete types that depend on them only are replaced
+    too.
     """
     model = _rewrite_model(_bind_parameters(model), _ShapeFolder(model).fold)
     structural = _structural_parameters(model)
@@ -66,10 +71,10 @@ def fold_constants(model: Model) -> Model:
 
 
 def _bind_parameters(model: Model) -> Model:
-    """Return the model with the initial equations of parameters with `fixed = false` as their bindings.
+    """Return the model with initial equations of parameters (`fixed = false`) as bindings.
 
-    Those that depend on variables or on the time become variables that are only computed at the initialization, and so do the
-    parameters that depend on them.
+    Those that depend on variables or on the time become variables that are only computed at the
+    initialization, and so do the parameters that depend on them.
     """
     free = {
         v.name
@@ -154,7 +159,7 @@ class _ShapeFolder:
 
 
 def _structural_parameters(model: Model) -> set[str]:
-    """Return the scalar and Integer parameters that determine the structure of the model, with those that they depend on."""
+    """Return the parameters that determine the structure, and those that they depend on."""
     pending, found = list(model.structural), set[str]()
     while pending:
         name = pending.pop()
@@ -201,7 +206,7 @@ def _unroll_known(node: Comprehension, model: Model) -> Expression:
 
 
 def string_parameters(model: Model) -> set[str]:
-    """Return the parameters of type String, and those that determine the String arguments of a function."""
+    """Return the String parameters, and those in String arguments of functions."""
     found = {
         v.name
         for v in model.variables.values()
@@ -220,7 +225,7 @@ def string_parameters(model: Model) -> set[str]:
 
 
 def fold_strings(model: Model) -> Model:
-    """Return the model with its String arguments as literals, and without the parameters and constants of type String.
+    """Return the model with String arguments as literals, without String parameters.
 
     Raises:
         EvaluationError: A String cannot be evaluated.

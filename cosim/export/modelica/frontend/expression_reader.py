@@ -58,7 +58,10 @@ def split_tagged(node: Json) -> tuple[str, Any]:
 
 
 def _fold_constants(node: Expression) -> Expression:
-    """Evaluate sums, differences and products of Integer literals, as they occur in the subscripts of an unrolled loop."""
+    """Evaluate sums, differences and products of Integer literals.
+
+    They occur in the subscripts of an unrolled loop.
+    """
     if not (isinstance(node, Binary) and node.operator in _INTEGER_OPERATORS):
         return node
     left, right = _fold_constants(node.left), _fold_constants(node.right)
@@ -80,7 +83,7 @@ class ExpressionReader:
     sources: ModelicaSources
 
     def locate(self, node: Json) -> SourceLocation | None:
-        """Return the source location of a node, or None for a node that the front end has generated."""
+        """Return the source location of a node, None if the front end has generated it."""
         return self.sources.locate(node.get("span") or node.get("source_span"))
 
     def _type(self, canonical: int) -> str:
@@ -190,7 +193,7 @@ class ExpressionReader:
         return If(branches, self.read_expression(node["else_branch"]))
 
     def _array(self, node: Json) -> Expression:
-        """Convert an array constructor, or a concatenation `[a, b; c, d]`, whose elements may be arrays."""
+        """Convert an array constructor, or a concatenation `[a, b; c, d]` of scalars or arrays."""
         elements = tuple(map(self.read_expression, node["elements"]))
         kind = node.get("kind")
         if kind not in ("Horizontal", "Vertical"):
@@ -200,7 +203,7 @@ class ExpressionReader:
         return Builtin("rows" if kind == "Vertical" else "columns", elements, self.locate(node))
 
     def _scalar_rows(self, rows: tuple[Expression, ...]) -> tuple[Array, ...]:
-        """Return the rows of a matrix as arrays if all their elements are certainly scalars, else no rows."""
+        """Return the rows of a matrix if all elements are certainly scalars, else no rows."""
         columns = [row.arguments for row in rows if is_call(row, "columns")]
         elements = chain.from_iterable(columns)
         if len(columns) != len(rows) or not all(map(self._is_scalar, elements)):
@@ -274,13 +277,16 @@ class ExpressionReader:
         return raise_model_error(reason, where)
 
     def scalar_names(self, local: Json) -> list[str]:
-        """Return the names of the fields of a record that is a variable of a function, or the name of any other variable."""
+        """Return the names of a record's fields, or the name of any other variable.
+
+        The variable is one of a function.
+        """
         return [f"{local['name']}.{field['name']}" for field in self.fields(local)] or [
             local["name"]
         ]
 
     def fields(self, local: Json) -> list[Json]:
-        """Return the fields of a record that is a variable of a function, none for other variables."""
+        """Return the fields of a record in a function, none for other variables."""
         if local["type_class"] != "Record":
             return []
         for function in self.json["functions"].values():

@@ -1,8 +1,9 @@
-"""Detection of if-equations in when-clauses that the front end has replaced by one of their branches (constant folding).
+"""Detection of if-equations in when-clauses that the front end has folded.
 
-Inside a when-clause rumoca silently replaces `if p then ... else ... end if` by one branch if the condition can be evaluated
-with default values. A parameter that is set later would have no effect. The flat model does not record this. Therefore the
-nesting depths are compared: an equation inside fewer `if` in the flat model than in the source file has lost one.
+Inside a when-clause rumoca silently replaces `if p then ... else ... end if` by one branch if the
+condition can be evaluated with default values. A parameter that is set later would have no effect.
+The flat model does not record this. Therefore the nesting depths are compared: an equation inside
+fewer `if` in the flat model than in the source file has lost one.
 """
 
 from __future__ import annotations
@@ -69,7 +70,7 @@ def _is_settable(json: Mapping[str, Any], name: str) -> bool:
 
 
 def _is_folded(statement: _IfEquation, depth: int, flat_equations: list[tuple[int, int]]) -> bool:
-    """Return whether an equation of the statement has lost an `if`, or all are missing from an existing when-clause."""
+    """Return whether an equation has lost an `if`, or all are missing from a when-clause."""
     depths = [
         flat_depth
         for start, flat_depth in flat_equations
@@ -82,7 +83,7 @@ def _is_folded(statement: _IfEquation, depth: int, flat_equations: list[tuple[in
 def _equations_by_file(
     json: Mapping[str, Any], sources: ModelicaSources
 ) -> dict[Path, list[tuple[int, int]]]:
-    """Return (byte offset, nesting depth in `if`) of all equations in when-clauses of the flat model, by source file."""
+    """Return offset (bytes) and depth in `if` of all when-equations, by source file."""
     result: dict[Path, list[tuple[int, int]]] = {}
     for chain in json["when_chains"]:
         for block in (chain["first"], *chain["else_when"]):
@@ -121,7 +122,7 @@ class _Scanner:
         self._found: list[tuple[_IfEquation, int]] = []
 
     def if_equations(self) -> list[tuple[_IfEquation, int]]:
-        """Return all if-equations in when-clauses with their nesting depth, which is 1 directly inside the when-clause."""
+        """Return all if-equations in when-clauses with their nesting depth, 1 for the outermost."""
         while self._next < len(self._tokens) - 1:
             self._next += 1
             if self._tokens[self._next - 1] == "equation":
@@ -188,7 +189,10 @@ class _Scanner:
                     return
 
     def _skip(self, word: str) -> None:
-        """Advance past the next occurrence of a symbol outside brackets (a matrix may contain semicolons)."""
+        """Advance past the next occurrence of a symbol outside brackets.
+
+        A matrix may contain semicolons.
+        """
         brackets = 0
         while self._next < len(self._tokens) - 1:
             self._next += 1

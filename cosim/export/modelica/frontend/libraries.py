@@ -233,7 +233,6 @@ def _preference(entry: Path) -> tuple[str, bool, list[int], str]:
 
 
 # -- annotations
-# ---------------------------------------------------------------------------------------------------------------
 
 
 def top_annotation(package_file: Path) -> Mapping[str, str]:
@@ -250,7 +249,7 @@ def _annotation_of_file(package_file: Path, _modified: int) -> Mapping[str, str]
 
 
 def _top_annotation_of(text: str) -> Mapping[str, str]:
-    """Return the arguments of the last annotation of a text, which belongs to its top-level class."""
+    """Return the arguments of the last annotation of a text, that of its top-level class."""
     tokens = re.finditer(rf"{_COMMENT_OR_STRING.pattern}|\bannotation\s*(?=\()", text, re.DOTALL)
     ends = [token.end() for token in tokens if token[0].startswith("annotation")]
     return dict(split_arguments(_inside_parentheses(text[ends[-1] :]))) if ends else {}
@@ -297,7 +296,7 @@ def _inside_parentheses(text: str) -> str:
 
 
 def _significant(text: str) -> Iterator[tuple[int, str, int]]:
-    """Yield position, character and depth of the commas and parentheses outside of strings and comments."""
+    """Yield position, character and depth of the commas and parentheses of the code."""
     depth = 0
     for token in re.finditer(rf"{_COMMENT_OR_STRING.pattern}|[,(){{}}]", text, re.DOTALL):
         character = token[0]

@@ -30,8 +30,10 @@ _OPERATOR = re.compile(rf"\b({'|'.join(_OPERATORS)}|return|reinit|terminate)\b")
 
 #: messages that do not name their cause -> their meaning
 _MEANINGS = {
-    "must name a coordinate classified as a continuous state": "der() needs a variable with a derivative: inputs, discrete "
-    "variables and parameters have none; filter an input u first, T*der(x) = u - x, and use der(x)",
+    "must name a coordinate classified as a continuous state": (
+        "der() needs a variable with a derivative: inputs, discrete variables and parameters have "
+        "none; filter an input u first, T*der(x) = u - x, and use der(x)"
+    ),
     "component binding type compatibility": "the type of the binding does not fit the declaration",
     "a non-guarded nested return": (
         "return inside a loop or a branch is not supported; write one assignment for each branch"
@@ -95,7 +97,7 @@ def _is_in_place_of_name(word: str, message: str) -> bool:
 def to_problems(
     answer: Mapping[str, Any], name: str, path: Path, sources: ModelicaSources
 ) -> list[Problem]:
-    """Convert the front end's message (see `rumoca_process`) to problems, one for each informative line."""
+    """Convert a message of `rumoca_process` to problems, one for each informative line."""
     error = answer["error"]
     if panic := _PANIC.search(error):
         return [
@@ -136,7 +138,7 @@ def _to_problem(
 
 
 def _shorten(reason: str) -> str:
-    """Return a reason without the phase of the front end and without counts of its internal kinds of equations."""
+    """Return a reason without the front end's phases and internal counts."""
     for message, meaning in _MEANINGS.items():
         if message in reason:
             return meaning
@@ -172,7 +174,7 @@ def _locate_problem(
 def _find_quoted_name(
     reason: str, files: Iterable[Path], lines: Container[int] | None = None
 ) -> SourceLocation | None:
-    """Return the first source line with a name that a message quotes, or with an operator that it names."""
+    """Return the first line with a name that a message quotes, or an operator in it."""
     return _find_name(
         (*_QUOTED.findall(reason), *_DIMENSION.findall(reason), *_OPERATOR.findall(reason)),
         files,
@@ -220,12 +222,13 @@ _OTHER_STATEMENT = (
 
 
 def explain_unsupported_operator(reason: str, sources: ModelicaSources) -> Problem | None:
-    """Return the problem for a reason of the front end with the place of the operator to which it is due.
+    """Return the problem for a reason that is due to an operator, with its place.
 
     The place is the first one in the file of the model, else in the other files that it needs.
 
     Returns:
-        None for a reason that is not due to one of these operators. The place is "" if the operator is not found.
+        None for a reason that is not due to one of these operators. The place is "" if the operator
+        is not found.
     """
     if _REFUSED_STATE_MACHINE.search(reason):
         calls = [
@@ -249,7 +252,7 @@ def explain_unsupported_operator(reason: str, sources: ModelicaSources) -> Probl
 
 
 def _calls(sources: ModelicaSources) -> Iterator[tuple[str, str, SourceLocation]]:
-    """Yield name, section and place of the calls of these operators in the files that a model needs."""
+    """Yield name, section and place of each call of these operators."""
     for path in sources.used:
         yield from _calls_in(path)
 

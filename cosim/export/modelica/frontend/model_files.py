@@ -1,4 +1,10 @@
-"""Files of a Modelica model: selection, text for the front end, and lines of its locations."""
+"""Files of a Modelica model: selection, text for the front end, and lines of its locations.
+
+A class can only be used by its name. So a file of a package is needed if its package is needed, and
+its name occurs in the code of a needed file. Names that occur for another reason add files, but no
+file that the model needs is left out. The selection depends on the contents of the needed files
+only: files beside them that are not used change nothing.
+"""
 
 from __future__ import annotations
 
@@ -18,12 +24,15 @@ _CLASS = r"^[^/\n]*\b(?:model|block|class|function|package|record|connector|type
 
 @dataclass(frozen=True)
 class ModelicaSources:
-    """The Modelica files that the front end has read, and the conversion of its spans (file hash, byte offset) to lines.
+    """Modelica files that the front end has read, and the lines of its spans.
+
+    A span has the hash of a file's name and an offset (bytes).
 
     Attributes:
         files: Files of the model and of the packages beside it, the file of the model first.
         libraries: Libraries that the model uses.
-        links: Folder with a link to each library, through which the front end reads them; None without libraries.
+        links: Folder with a link to each library, through which the front end reads them; None
+            without libraries.
         text: Text of the model's file as the front end reads it; None if it reads the file itself.
         used: Those of the files that the model needs, the file of the model first.
     """
@@ -64,7 +73,7 @@ class ModelicaSources:
         return self._by_hash.get(_fnv1a(name))
 
     def locate_class(self, name: str) -> SourceLocation:
-        """Return the line with the declaration of a class in the file of the model, or the first line of this file."""
+        """Return the declaration of a class in the file of the model, else its first line."""
         path = self.files[0]
         text = path.read_text(encoding="utf-8")
         declaration = re.search(
@@ -75,7 +84,7 @@ class ModelicaSources:
         )
 
     def locate_library_class(self, names: Iterable[str]) -> SourceLocation | None:
-        """Return the declaration of the first class of a library, or of a package beside the model, among full names."""
+        """Return the declaration of the first class of a package among full names."""
         for name in names:
             folder = self.packages.get(name.partition(".")[0])
             if folder and "." in name and (place := find_class(folder, name.split(".")[1:])):
@@ -187,7 +196,7 @@ def _with_package_files(path: Path, packages: Sequence[Path]) -> list[Path]:
 
 
 def find_packages(path: Path, text: str) -> list[Path]:
-    """Return the folders of the packages that a file may use, for the file and its contents `text`."""
+    """Return the folders of the packages that a file with some text may use."""
     folder = path.parent
     if _is_member(path, text):
         while (folder / _PACKAGE_FILE).is_file():
@@ -201,7 +210,9 @@ _NAME = re.compile(r"[A-Za-z_]\w*")
 
 
 def select_used_files(path: Path, packages: Sequence[Path], declaration: str = "") -> list[Path]:
-    """Return the file of a model, then the files of packages that it needs, sorted within each package.
+    """Return the file of a model, then the files of packages that it needs.
+
+    They are sorted within each package.
 
     Args:
         path: The file of the model.

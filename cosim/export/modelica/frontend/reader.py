@@ -1,6 +1,10 @@
 """Conversion of rumoca's JSON to the flat model.
 
 Unknown elements are errors, they are never ignored.
+
+The front end unrolls some for-equations only in part. For these, its document contains the
+equations of the first iterations and a template for all iterations. The equations of the other
+iterations are placeholders such as `der(x[3]) = 0.0`, in which only the left side is correct.
 """
 
 from __future__ import annotations
@@ -139,7 +143,7 @@ class ModelReader(StatementReader):
         return "local" if word == "empty" else word
 
     def _is_top_level(self, name: str) -> bool:
-        """Return whether a variable belongs to the model itself, also as a field of its records or connectors."""
+        """Return whether a variable belongs to the model itself, its records or connectors."""
         parts = name.split(".")
         owners = (".".join(parts[:depth]) for depth in range(1, len(parts)))
         return parts[0] in self.json["top_level_connectors"] or all(
@@ -174,7 +178,7 @@ class ModelReader(StatementReader):
         return tuple(chain.from_iterable(map(self._equation, self.json[section])))
 
     def _unrolled_equations(self) -> Iterator[Equation]:
-        """Yield all equations, with the placeholders of for-equations replaced (see `unrolling`)."""
+        """Yield all equations, with the placeholders of for-equations replaced."""
         replacements = dict(unroll_equations(self.json, "structured_equations"))
         for index, node in enumerate(self.json["equations"]):
             equations = self._equation(
@@ -229,7 +233,7 @@ class ModelReader(StatementReader):
     def _split_records(
         self, left: Expression, right: Expression
     ) -> list[tuple[Expression, Expression]]:
-        """Return the pairs of fields of an equation between two records, or the pair itself for all other equations."""
+        """Return the pairs of fields of an equation between records, else the pair itself."""
         records = self.json["record_instances"]
         if not (isinstance(left, Name) and left.name in records):
             return [(left, right)]
@@ -258,7 +262,10 @@ class ModelReader(StatementReader):
         ]
 
     def _declaration_equations(self) -> list[Equation]:
-        """Return the declaration equations (`Real y = 2*u;`) of all variables that are neither parameters nor constants."""
+        """Return the declaration equations (`Real y = 2*u;`) of variables.
+
+        Parameters and constants have bindings instead.
+        """
         variables = [self.read_variable(name) for name in self.json["variables"]]
         return [
             Equation(Name(v.name, v.where), v.binding, v.where)
@@ -326,7 +333,7 @@ class ModelReader(StatementReader):
 
 
 def _is_default(variable: Variable) -> bool:
-    """Return whether the declaration equation of a variable is the value of an input of the model that nothing sets."""
+    """Return whether the binding is the value of an input that nothing sets."""
     is_input = variable.causality == "input" and variable.top_level and not variable.protected
     return is_input and isinstance(variable.binding, Literal)
 

@@ -124,7 +124,7 @@ Token = tuple[str, int, int]
 
 
 def removable_parts(text: str) -> list[tuple[int, int]]:
-    """Return begin and end of each equation or statement of a Modelica text, and then of each binding of a declaration.
+    """Return begin and end of each equation or statement, then of each binding.
 
     >>> text = "model M Real x = 1; equation y = x; end M;"
     >>> [text[begin:end] for begin, end in removable_parts(text)]
@@ -145,7 +145,9 @@ def removable_parts(text: str) -> list[tuple[int, int]]:
 
 
 def assigned_values(text: str) -> list[tuple[int, int]]:
-    """Return begin and end of the right side of each assignment, also inside loops and branches, and then of each equation.
+    """Return begin and end of the right side of each assignment, then of each equation.
+
+    Those inside of loops and branches are included.
 
     >>> text = "model M Real x; algorithm if a then x := 1; end if; equation y = x; end M;"
     >>> [text[begin:end] for begin, end in assigned_values(text)]

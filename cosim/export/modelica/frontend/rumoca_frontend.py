@@ -138,7 +138,7 @@ def _check_names(flat: Mapping[str, Any], values: Mapping[str, Any], model: str)
 
 
 def modified_model(name: str, values: Mapping[str, Any], supplement: str = "") -> str:
-    """Return the declaration of the model MODIFIED_MODEL with values of parameters and a supplement, "" without both.
+    """Return the declaration of MODIFIED_MODEL, "" without values and supplement.
 
     Raises:
         InputError: A name is not that of a component, or a value cannot be one of a parameter.
@@ -220,7 +220,7 @@ def _version_problem(found: str | None) -> str:
 
 
 def read_document(key: Sequence[Any]) -> str | None:
-    """Return the flat model with a key as JSON text, or None if the cache does not contain it undamaged."""
+    """Return the flat model with a key as JSON text, None if the cache lacks it or is damaged."""
     with suppress(OSError, EOFError, ValueError):
         return gzip.decompress(_document_file(key).read_bytes()).decode()
     return None

@@ -107,10 +107,11 @@ def _flatten(rumoca: Any, request: dict[str, Any]) -> dict[str, Any]:
 def _find_subscripts_out_of_bounds(
     session: Any, request: dict[str, Any], document: str
 ) -> list[tuple[str, Any]]:
-    """Return message and span of each for-equation with a subscript beyond the declared size of an array.
+    """Return message and span of each for-equation with a subscript beyond an array.
 
-    rumoca enlarges such an array without a message. It refuses the same subscript outside a for-equation, so a further model
-    with one declaration in each line reads the last element of each array.
+    rumoca enlarges such an array without a message. It refuses the same subscript outside a
+    for-equation, so a further model with one declaration in each line reads the last element of
+    each array.
     """
     try:
         flat = json.loads(document)

@@ -220,7 +220,10 @@ class StatementReader(ExpressionReader):
         )
 
     def _destructor(self, constructor: Json) -> str:
-        """Return the C function of the destructor of an external object, which the document does not contain."""
+        """Return the C function of the destructor of an external object.
+
+        The document does not contain it.
+        """
         where = self.locate(constructor)
         text = where.path.read_bytes()[constructor["span"]["start"] :].decode() if where else ""
         match = _DESTRUCTOR.search(text)

@@ -1,7 +1,8 @@
 """Arithmetic with the same results as the generated C code, bit for bit.
 
-The order of operations is that of the C code, and `math` provides the functions of the C library. Where Python would raise an
-exception, the result is that of IEEE 754 (NaN or infinity). Arrays are NumPy arrays that are computed element by element.
+The order of operations is that of the C code, and `math` provides the functions of the C library.
+Where Python would raise an exception, the result is that of IEEE 754 (NaN or infinity). Arrays are
+NumPy arrays that are computed element by element.
 """
 
 from __future__ import annotations
@@ -89,7 +90,10 @@ def divide(a: float, b: float) -> float:
 def with_ieee_results(
     function: Callable[..., float], at_pole: float = math.nan
 ) -> Callable[..., float]:
-    """Wrap a function of `math` so that it returns NaN, infinity or the value at its pole where Python raises an error."""
+    """Wrap a function of `math` so that it returns the value of IEEE 754 for an error.
+
+    It is NaN, infinity or the value at a pole.
+    """
 
     def wrapped(*arguments: float) -> float:
         try:

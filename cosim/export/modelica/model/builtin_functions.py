@@ -63,7 +63,10 @@ class BuiltinFunction:
 def _real_or_integer(
     real: Callable[[float, float], float], whole: Callable[[int, int], int]
 ) -> Callable[[Any, Any], Any]:
-    """Combine a function for Real and one for Integer arguments, which fails for a divisor of zero."""
+    """Combine a function for Real and one for Integer arguments.
+
+    The latter fails for a divisor of zero.
+    """
 
     def wrapped(a: Any, b: Any) -> Any:
         if isinstance(a, float) or isinstance(b, float):
@@ -141,7 +144,7 @@ def _call(name: str, *arguments: Expression) -> Expression:
 
 
 def _chain(outer: Callable[[Expression], Expression]) -> Derivative:
-    """Return the derivative of f(x) by the chain rule, with the derivative of f as a function of x."""
+    """Return the derivative of f(x) by the chain rule; `outer` is the derivative of f."""
     return lambda differentiate, x: multiply(outer(x), differentiate(x))
 
 
@@ -155,7 +158,7 @@ def _of_argument(number: int) -> Derivative:
 
 
 def _of_selected(comparison: str) -> Derivative:
-    """Return the derivative of min() or max() of two scalars, that of the argument that is selected."""
+    """Return the derivative of min() or max(): that of the selected argument."""
 
     def derivative(differentiate: Any, *arguments: Expression) -> Expression | None:
         if len(arguments) != 2:

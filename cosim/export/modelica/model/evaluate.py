@@ -226,7 +226,7 @@ class Evaluator:
         return [scope.values[local.name] for local in function.outputs]
 
     def call_external(self, function: Function) -> None:
-        """Call the C function of an external function, with this scope as the one of the function."""
+        """Call the C function of an external function, whose scope is this one."""
         (node,) = function.body
         assert isinstance(node, ExternalCall)
         assert function.external

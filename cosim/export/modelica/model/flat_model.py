@@ -188,7 +188,7 @@ class Model:
 
 
 def is_integrated(model: Model) -> bool:
-    """Return whether a model with event iteration has states, or relations that change with time."""
+    """Return whether a model with event iteration has states or relations."""
     return model.hybrid is not None and bool(model.states or model.hybrid.relations)
 
 
@@ -202,7 +202,7 @@ def given_variables(model: Model) -> set[str]:
 
 
 def internal_variable(variable: Variable, name: str) -> Variable:
-    """Return the declaration of a variable that the compiler inserts, with type and shape of another variable."""
+    """Return the declaration of an inserted variable, with type and shape of another one."""
     return replace(
         variable,
         name=name,
@@ -227,7 +227,7 @@ def derivative_name(state: str) -> str:
 
 
 def previous_name(variable: str) -> str:
-    """Return the name of the variable that holds the value of a variable before the current event."""
+    """Return the name of the variable with the value of a variable before the event."""
     return f"pre({variable})"
 
 

@@ -54,7 +54,10 @@ _OPERATIONS = {"+": add, "-": subtract, "*": multiply, "/": divide}
 
 
 def without_zeros(node: Expression) -> Expression:
-    """Return an expression without the terms and factors that are zero; a division by zero remains."""
+    """Return an expression without terms and factors that are zero.
+
+    A division by zero remains.
+    """
 
     def simplify(item: object) -> object:
         if isinstance(item, Unary) and item.operand == ZERO:

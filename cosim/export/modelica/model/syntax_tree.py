@@ -157,7 +157,7 @@ class Call:
 
 @dataclass(frozen=True, slots=True)
 class Assign:
-    """An assignment `target := value`, from an algorithm or from an equation after causality analysis."""
+    """An assignment `target := value` of an algorithm, or of a solved equation."""
 
     target: Name | Index
     value: Expression

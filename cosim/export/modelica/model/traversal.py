@@ -59,7 +59,7 @@ def rewrite(node: Any, change: Callable[[Any], Any]) -> Any:
 
 
 def unroll(node: Comprehension, values: Sequence[Literal]) -> Array:
-    """Return an array constructor with an iterator as a list of elements, one for each value of the iterator."""
+    """Return an array constructor with an iterator as a list of elements."""
 
     def element(value: Literal) -> Any:
         return rewrite(node.value, lambda each: value if each == Name(node.index) else each)
@@ -151,7 +151,7 @@ def assigned_references(node: Any) -> Iterator[Name | Index]:
 
 
 def composed_asserts(node: Any) -> list[Assert]:
-    """Return the assertions whose message is composed at run time, a warning or that of a `terminate`."""
+    """Return the warnings, the `terminate` and the assertions with a composed message."""
     composed = []
     for item in walk(node):
         if isinstance(item, Assert):
