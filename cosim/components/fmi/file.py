@@ -13,7 +13,7 @@ from hashlib import file_digest
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...core.errors import InputError
+from ...core.errors import InputError, join_alternatives
 from ...process.journal import current_journal, suspending_deadline
 from ...process.temporary_folders import FMU_PREFIX, LockedFolder
 from .description import FmuDescription, build_description
@@ -29,7 +29,7 @@ from .preflight import (
     raise_errors,
 )
 from .preflight.archive import Archive
-from .preflight.binary import WINDOWS, can_be_compiled
+from .preflight.binary import WINDOWS, list_platforms
 from .preflight.platforms import current_platform
 
 #: largest number of FMU contents, and of extracted folders on the disk
@@ -62,7 +62,10 @@ _idle_folders: dict[FileKey, ExtractedFolder] = {}
 
 
 def take_folder(key: FileKey) -> ExtractedFolder | None:
-    """Return the folder of an FMU that was extracted for an earlier run, if its files are unchanged; else None."""
+    """Return the folder of an FMU from an earlier run.
+
+    None if there is none, or if its files have changed.
+    """
     extracted = _idle_folders.pop(key, None)
     if extracted is None:
         return None
@@ -74,7 +77,10 @@ def take_folder(key: FileKey) -> ExtractedFolder | None:
 
 
 def keep_folder(key: FileKey, extracted: ExtractedFolder, library: str) -> None:
-    """Keep the folder for the next run, unless the operating system has kept the FMU's library with its static variables."""
+    """Keep the folder for the next run.
+
+    It is removed if the operating system has kept the FMU's library with its static variables.
+    """
     # no other run follows in a supervised process, which ends without finalizers
     if current_journal():
         extracted.folder.cleanup()
@@ -101,7 +107,7 @@ def remove_idle_folders() -> None:
 
 
 def list_files(folder: str) -> Listing:
-    """Return the files of a folder and of its subfolders, with all that changes when one of them is written."""
+    """Return the files below a folder, with all that changes when one of them is written."""
     listing: Listing = []
     folders = [folder]
     while folders:
@@ -179,7 +185,7 @@ class FmuFile:
         return description
 
     def _remember(self, part: str, read: Callable[[], Any]) -> Any:
-        """Return what is read from the file, which is read again only if its content has changed."""
+        """Return what is read from the file; read it only if its content is new."""
         if not self._key:
             return read()
         key = (part, self.limits, self._key)
@@ -206,7 +212,17 @@ class FmuFile:
             return None
 
     def _build_description(self) -> FmuDescription:
-        return build_description(self.path, self.examination, self._interface)
+        raise_errors(self.path, self.examination.findings)
+        model = self.examination.model
+        assert model is not None  # otherwise the examination has found an error
+        preferred, selected = next(iter(model.interfaces)), self._interface
+        interface = preferred if selected is None else selected
+        if interface not in model.interfaces:
+            raise InputError(
+                f'"{self.path}": has no interface for {interface}, only for '
+                f"{join_alternatives(model.interfaces)}"
+            )
+        return build_description(model, interface, list_platforms(self.examination.members))
 
     @property
     def has_binary(self) -> bool:
@@ -223,7 +239,7 @@ class FmuFile:
     @property
     def must_be_compiled(self) -> bool:
         """True for an FMU that has sources but no binary for this platform."""
-        return not self.has_binary and can_be_compiled(self.description.platforms)
+        return not self.has_binary and "c-code" in self.description.platforms
 
     @property
     def run_warning(self) -> str:
@@ -263,7 +279,9 @@ class FmuFile:
         raise_errors(self.path, self.examination.binary_findings[self.description.interface])
 
     def acquire(self) -> Path:
-        """Extract the FMU if necessary and return the folder, which exists until the matching `release`.
+        """Extract the FMU if necessary and return the folder.
+
+        The folder exists until the matching `release`.
 
         Raises:
             InputError: The FMU does not pass the preflight check or cannot be extracted.

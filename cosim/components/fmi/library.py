@@ -41,7 +41,10 @@ class GilHoldingFunction(CFuncPtr):
 
 
 class GilReleasingFunction(CFuncPtr):
-    """C function that is called without the global interpreter lock, because it may take long or log from other threads."""
+    """C function that is called without the global interpreter lock.
+
+    It may take long, or log from other threads.
+    """
 
     _flags_ = FUNCFLAG_CDECL
 
@@ -95,7 +98,10 @@ def load_library(file: FmuFile, folder: Path) -> Any:
 
 
 def _create_slave(description: FmuDescription, folder: Path) -> Any:
-    """Create FMPy's slave object without its constructor, which changes the working directory of all threads during the load."""
+    """Create FMPy's slave object without its constructor.
+
+    The constructor changes the working directory of all threads during the load.
+    """
     major, machine = description.major, current_platform()
     interface = "Model" if description.interface == "model-exchange" else "Slave"
     slave_class = getattr(import_module(f"fmpy.fmi{major}"), f"FMU{major}{interface}")
@@ -198,7 +204,7 @@ _handlers: dict[int, tuple[bytes, _MessageHandler]] = {}
 
 
 def register_logger(callbacks: Any, instance_name: str, handler: _MessageHandler) -> int:
-    """Set the logger in the callback functions of an instance.
+    """Set logger and memory management in the callback functions of an instance.
 
     Args:
         callbacks: FMPy's fmi1CallbackFunctions or fmi2CallbackFunctions.
@@ -209,10 +215,14 @@ def register_logger(callbacks: Any, instance_name: str, handler: _MessageHandler
         The key of the registration, for `unregister_logger`. It is the componentEnvironment of
         FMI 2.0.
     """
+    from fmpy import calloc, free
+
     key = next(_environments)
     _handlers[key] = instance_name.encode(), handler
     logger = ctypes.c_void_p(_logger.LOGGER) if _logger else _UNFORMATTED
     callbacks.logger = ctypes.cast(logger, type(callbacks.logger))
+    callbacks.allocateMemory = type(callbacks.allocateMemory)(calloc)
+    callbacks.freeMemory = type(callbacks.freeMemory)(free)
     if hasattr(callbacks, "componentEnvironment"):
         callbacks.componentEnvironment = key
     return key

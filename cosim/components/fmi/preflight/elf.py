@@ -199,7 +199,10 @@ class _ElfReader:
     def _exported_symbols(
         self, dynamic: Mapping[int, int], strings: bytes
     ) -> Iterator[tuple[str, int]]:
-        """Yield names and addresses (0 in 32-bit files) of the symbols that are defined and visible to other libraries."""
+        """Yield names and addresses of the symbols that are defined and visible to others.
+
+        The addresses are 0 in 32-bit files.
+        """
         symbol = struct.Struct(self.byte_order + ("L2BHQ8x" if self.bits == 64 else "L8x2BH"))
         table = self._read_address(dynamic[_DT_SYMTAB], self._symbol_count(dynamic) * symbol.size)
         for st_name, st_info, st_other, st_shndx, *st_value in symbol.iter_unpack(table):
@@ -220,6 +223,9 @@ class _ElfReader:
 
     def _gnu_symbol_count(self, offset: int) -> int:
         """Return one more than the largest symbol index in the chains of a GNU hash table."""
+        # The table has no number of symbols. Each bucket holds the first symbol of a chain, and the
+        # chain ends with a hash whose lowest bit is set: the end of the chain with the largest first
+        # symbol is the last symbol.
         nbuckets, symoffset, bloom_size, _ = self.unpack("4L", offset)
         if nbuckets > _MAX_SYMBOLS or bloom_size > _MAX_SYMBOLS:
             raise InvalidLibraryError(f"is damaged: it claims {nbuckets} hash buckets")
