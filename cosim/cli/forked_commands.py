@@ -1,20 +1,21 @@
 """Commands of `cosim` in forked processes, so that modules are imported only once.
 
 Each command runs in a process of its own, as if it had been started by `python -m cosim`. It is
-forked by a process that was forked from this one before this one started threads.
+forked by a process that was forked from this one before this one started threads. Both are needed:
+a process with threads must not be forked, and a command must not find what another one has changed.
 """
 
 from __future__ import annotations
 
 import gc
-import json
 import os
 import signal
-import socket
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from importlib import import_module
+from multiprocessing import Pipe, get_context
+from multiprocessing.connection import Connection
 from pathlib import Path
 from queue import SimpleQueue
 from subprocess import CompletedProcess
@@ -45,10 +46,9 @@ SignalMask = set[int | signal.Signals]
 def forked_commands(count: int) -> Iterator[CommandRunner]:
     """Yield a function that runs a `cosim` command in a separate process.
 
-    `count` threads may call it at the same time.
-
-    This process must have no threads and must not have loaded FMUs. Where processes cannot be
-    forked, the function starts a new process for each command.
+    `count` threads may call it at the same time. This process must have no threads and must not
+    have loaded FMUs. Where processes cannot be forked, or if a forking process has been killed, the
+    function starts a new process for each command.
     """
     if not hasattr(os, "fork"):
         yield run_in_new_process
@@ -57,89 +57,73 @@ def forked_commands(count: int) -> Iterator[CommandRunner]:
         import_module(module)
     gc.freeze()
     with ExitStack() as stack:
-        idle = SimpleQueue[_ForkingProcess]()
+        idle = SimpleQueue[Connection]()
         for _ in range(count):
-            idle.put(process := _ForkingProcess())
-            stack.callback(process.close)
+            idle.put(stack.enter_context(_forking_process()))
 
         def run(words: Sequence[str]) -> CompletedProcess[str]:
-            process = idle.get()
+            connection = idle.get()
             try:
-                return process.run(words)
+                connection.send(words)
+                return CompletedProcess(words, *connection.recv())
+            except (OSError, EOFError):
+                return run_in_new_process(words)
             finally:
-                idle.put(process)
+                idle.put(connection)
 
         yield run
 
 
-class _ForkingProcess:
-    """Process that forks one command at a time."""
-
-    def __init__(self) -> None:
-        self._connection, other = socket.socketpair()
-        sys.stdout.flush()
-        sys.stderr.flush()
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        self._process = os.fork()
-        if self._process == 0:
-            self._connection.close()
-            _serve(other, mask)
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        other.close()
-        self._stream = self._connection.makefile("rw", encoding="utf-8")
-
-    def run(self, words: Sequence[str]) -> CompletedProcess[str]:
-        """Run a command; in a new process if the forking process has ended."""
-        with suppress(ConnectionError):
-            print(json.dumps(words), file=self._stream, flush=True)
-            if answer := self._stream.readline():
-                code, errors = json.loads(answer)
-                return CompletedProcess(words, code, "", errors)
-        return run_in_new_process(words)
-
-    def close(self) -> None:
-        """End the process."""
-        with suppress(OSError):
-            self._connection.shutdown(socket.SHUT_RDWR)
-        with suppress(ChildProcessError):
-            os.waitpid(self._process, 0)
-        with suppress(OSError):
-            self._stream.close()
-        self._connection.close()
+@contextmanager
+def _forking_process() -> Iterator[Connection]:
+    """Yield the connection to a process that forks one command at a time."""
+    ours, theirs = Pipe()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    process = get_context("fork").Process(target=_serve, args=(theirs, ours, mask))
+    process.start()
+    signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+    theirs.close()
+    try:
+        yield ours
+    finally:
+        ours.close()
+        process.join()
 
 
-def _serve(connection: socket.socket, mask: SignalMask) -> NoReturn:
-    """Run commands until the connection is closed.
+def _serve(connection: Connection, other: Connection, mask: SignalMask) -> NoReturn:
+    """Run commands until the other end of the connection is closed.
 
     Interrupts, which commands receive too, are blocked.
     """
     try:
-        _redirect_streams((0, 1, 2))
-        with connection.makefile("rw", encoding="utf-8") as stream:
-            for line in stream:
-                print(
-                    json.dumps(_run_command(json.loads(line), connection, mask)),
-                    file=stream,
-                    flush=True,
-                )
+        other.close()
+        null = os.open(os.devnull, os.O_RDWR)
+        for number in range(3):
+            os.dup2(null, number)
+        while True:
+            connection.send(_run_command(connection.recv(), mask))
     finally:
         os._exit(0)
 
 
-def _run_command(words: list[str], connection: socket.socket, mask: SignalMask) -> tuple[int, str]:
-    """Run a command in a forked process; return its exit code and its standard error."""
+def _run_command(words: list[str], mask: SignalMask) -> tuple[int, str, str]:
+    """Run a command in a forked process.
+
+    Return its exit code as `subprocess` defines it, no output, and its standard error.
+    """
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:
         os.dup2(writer, 2)
         os.close(writer)
         os.close(reader)
-        connection.detach()
         _become_command(words, mask)
     os.close(writer)
     with os.fdopen(reader, errors="replace") as pipe:
         text = pipe.read()
-    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), text
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), "", text
 
 
 def _become_command(words: list[str], mask: SignalMask) -> NoReturn:
@@ -163,11 +147,3 @@ def _become_command(words: list[str], mask: SignalMask) -> NoReturn:
         for stream in filter(None, (sys.stdout, sys.stderr)):
             stream.flush()
         os._exit(code if isinstance(code, int) else 70)
-
-
-def _redirect_streams(numbers: Sequence[int]) -> None:
-    """Connect standard streams to the null device."""
-    null = os.open(os.devnull, os.O_RDWR)
-    for number in numbers:
-        os.dup2(null, number)
-    os.close(null)

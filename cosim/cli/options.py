@@ -17,6 +17,8 @@ from . import CommandLine
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
+#: type of options that are paths
+PATH = click.Path(path_type=Path)
 #: decorator that adds options to a command
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -53,7 +55,7 @@ settings_option = click.option(
 )
 output_dir_option = click.option(
     "--output-dir",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="Folder for the results; default: runs/NAME.",
 )
 jobs_option = click.option(
@@ -76,8 +78,7 @@ def new_file_options(result: str = "file") -> Decorator:
 
     def add_options(command: Callable[..., Any]) -> Callable[..., Any]:
         force = click.option("--force", is_flag=True, help=f"Overwrite {what}.")
-        path = click.Path(path_type=Path)
-        return click.option("--directory", type=path, default=Path(), help=where)(force(command))
+        return click.option("--directory", type=PATH, default=Path(), help=where)(force(command))
 
     return add_options
 

@@ -198,9 +198,7 @@ def save_after_crash(outcome: SupervisedOutcome, options: RunOptions) -> None:
         if outcome.failure:
             code = outcome.failure.exit_code
             supervision.run_supervised_command(
-                lambda: _report_failed_run(partial, folder.parent, options, code),
-                "run",
-                lambda _outcome: None,
+                lambda: _report_failed_run(partial, folder.parent, options, code)
             )
 
 

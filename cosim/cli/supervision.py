@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from pathlib import Path
 from shutil import rmtree
 from typing import TYPE_CHECKING, Any
 
@@ -49,8 +48,8 @@ def supervision_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def run_supervised_command(
     entry: Callable[[], int],
-    isolation: str,
-    save_partial: Callable[[SupervisedOutcome], None],
+    isolation: str = "run",
+    save_partial: Callable[[SupervisedOutcome], None] | None = None,
     while_running: Callable[[Journal], AbstractContextManager[object]] = nullcontext,
 ) -> int:
     """Run a command in a supervised child process and return its exit code.
@@ -59,7 +58,7 @@ def run_supervised_command(
         entry: the command's work; returns the exit code.
         isolation: value of `--isolation`; with "none", `entry` is called in this process.
         save_partial: called if the child left files of an unfinished run, to save the rows recorded
-            until then.
+            until then; the files stay if it raises an error.
         while_running: context of this process while the child runs.
 
     Raises:
@@ -67,6 +66,7 @@ def run_supervised_command(
             component.
         KeyboardInterrupt: if the user interrupted the child.
     """
+    from ..process.run_files import find_kept_rows
     from ..process.supervisor import can_supervise, run_supervised
 
     if isolation == "none" or not can_supervise():
@@ -76,32 +76,20 @@ def run_supervised_command(
     if outcome.warning:
         click.echo(f"WARNING {outcome.warning}", err=True)
     folder = outcome.journal.folder
-    if folder and folder.is_dir():
-        _save_partial(outcome, save_partial, folder)
+    # a child that has kept the rows has said so
+    if folder and folder.is_dir() and (outcome.failure or not find_kept_rows(folder)):
+        try:
+            if save_partial:
+                save_partial(outcome)
+        except CosimError as error:
+            click.echo(str(error), err=True)
+        else:
+            rmtree(folder, ignore_errors=True)
     if outcome.interrupted:
         raise KeyboardInterrupt
     if outcome.failure:
         raise outcome.failure
     return outcome.exit_code
-
-
-def _save_partial(
-    outcome: SupervisedOutcome, save_partial: Callable[[SupervisedOutcome], None], folder: Path
-) -> None:
-    """Save the rows of an unfinished run and remove its folder.
-
-    The folder stays if writing fails, or if the child has kept the rows and said so.
-    """
-    from ..process.run_files import find_kept_rows
-
-    if find_kept_rows(folder) and not outcome.failure:
-        return
-    try:
-        save_partial(outcome)
-    except CosimError as error:
-        click.echo(str(error), err=True)
-    else:
-        rmtree(folder, ignore_errors=True)
 
 
 def results_written(code: int) -> int:

@@ -117,7 +117,7 @@ def _resources(factory: type) -> dict[str, str]:
 
 
 def _check_do_step(factory: type, reference: str) -> None:
-    """Raise InputError unless a PythonFMU class has a method `do_step` that accepts the time and the step size."""
+    """Raise InputError unless a PythonFMU class has a method `do_step` with its arguments."""
     method = factory.__dict__.get("do_step") or getattr(factory, "do_step", None)
     if method is None or getattr(method, "__isabstractmethod__", False):
         raise InputError(f"{reference} has no method do_step(self, current_time, step_size)")
@@ -248,7 +248,7 @@ def _required_methods(causalities: set[Causality], has_state: bool) -> Iterator[
 
 
 def _misnamed_method_hint(candidate: Any, name: str) -> str:
-    """Return a message suffix that names a similarly spelt method of the candidate, or an empty string."""
+    """Return a message suffix that names a similarly spelt method of the candidate, or ""."""
     own_names = [other for other in dir(type(candidate)) if not hasattr(Component, other)]
     similar = get_close_matches(name, own_names, n=1)
     return f', but "{similar[0]}"' if similar else ""

@@ -9,7 +9,7 @@ import textwrap
 from collections import defaultdict
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pythonfmu import Fmi2Slave
@@ -30,14 +30,6 @@ from ..core.text import shorten, text_problem
 from ..core.units import named_unit, parse_unit
 from .object_state import snapshot
 from .slave_protection import PYTHONFMU_ATTRIBUTES
-
-_TYPES = {Real: "Float64", Integer: "Int32", Boolean: "Boolean", String: "String"}
-_CASTS: Mapping[str, Callable[[Any], Any]] = {
-    "Float64": float,
-    "Int32": int,
-    "Boolean": bool,
-    "String": str,
-}
 
 
 def _to_float(value: Any) -> float:
@@ -62,27 +54,39 @@ def _to_str(value: Any) -> str:
     return value
 
 
-#: FMI type -> the usual Python type of an output, and a lossless conversion from other types
-_OUTPUT_TYPES: Mapping[str, tuple[type, Callable[[Any], Any]]] = {
-    "Float64": (float, _to_float),
-    "Int32": (int, operator.index),
-    "Boolean": (bool, _to_bool),
-    "String": (object, _to_str),  # of no type without a check of its characters
-}
-#: FMI type -> what a message about an output expects
-_EXPECTED = {
-    "Float64": "a number",
-    "Int32": "an integer of 32 bits",
-    "Boolean": "True or False",
-    "String": "a text",
+class _Kind(NamedTuple):
+    """Type of PythonFMU variables.
+
+    Attributes:
+        fmi_type: FMI 3.0 type name.
+        cast: Conversion of a value for the setter, and of the getter's result.
+        usual_type: Python type of an output that needs no conversion.
+        convert: Lossless conversion of an output of another type.
+        expected: What a message about an output expects.
+    """
+
+    fmi_type: str
+    cast: Callable[[Any], Any]
+    usual_type: type
+    convert: Callable[[Any], Any]
+    expected: str
+
+
+_KINDS = {
+    Real: _Kind("Float64", float, float, _to_float, "a number"),
+    Integer: _Kind("Int32", int, int, operator.index, "an integer of 32 bits"),
+    Boolean: _Kind("Boolean", bool, bool, _to_bool, "True or False"),
+    # no usual type, because the characters of each text have to be checked
+    String: _Kind("String", str, object, _to_str, "a text"),
 }
 
 
 class PythonFmuComponent(Component):
-    """Component that runs a `pythonfmu.Fmi2Slave` in the importer's process, without export as an FMU.
+    """Component that runs a `pythonfmu.Fmi2Slave` without export as an FMU.
 
-    Its state is the whole state of the Python object (see `object_state`), or the result of an overridden `_get_fmu_state`, as
-    in an FMU that `cosim build` exports. The state of an FMU exported by PythonFMU contains only the registered variables.
+    Its state is the whole state of the Python object (see `object_state`), or the result of an
+    overridden `_get_fmu_state`, as in an FMU that `cosim build` exports. The state of an FMU
+    exported by PythonFMU contains only the registered variables.
     """
 
     binds_everything = False
@@ -93,25 +97,25 @@ class PythonFmuComponent(Component):
         self._pythonfmu_variables: dict[str, ScalarVariable] = {
             v.name: v for v in slave.vars.values()
         }
-        types = {v.name: _fmi_type(v) for v in slave.vars.values()}
+        self._kinds = {v.name: _find_kind(v) for v in slave.vars.values()}
+        types = {name: kind.fmi_type for name, kind in self._kinds.items()}
         self._units = checked_units(getattr(type(slave), "units", {}), types, type(slave))
         self.variables = [_to_variable(v, self._units.get(v.name)) for v in slave.vars.values()]
         self._setters: list[tuple[Callable[[Any], None], np.ndarray, int]] = []
         self._getters: list[
             tuple[str, Callable[[], Any], type, Callable[[Any], Any], np.ndarray, int]
         ] = []
-        self._types = {variable.name: variable.type for variable in self.variables}
         self._has_custom_state = type(slave)._get_fmu_state is not Fmi2Slave._get_fmu_state
 
     def set(self, name: str, value: Any) -> None:
         """Set one variable by its PythonFMU setter."""
-        registered = self._pythonfmu_variables[name]
-        self._call_user_code("set", registered.setter, _CASTS[_fmi_type(registered)](value))
+        setter, kind = self._pythonfmu_variables[name].setter, self._kinds[name]
+        self._call_user_code("set", setter, kind.cast(value))
 
     def get(self, name: str) -> Any:
         """Return the value of one variable by its PythonFMU getter."""
-        registered = self._pythonfmu_variables[name]
-        return _CASTS[_fmi_type(registered)](self._call_user_code("get", registered.getter))
+        value = self._call_user_code("get", self._pythonfmu_variables[name].getter)
+        return self._kinds[name].cast(value)
 
     def unit_source(self, name: str) -> str:
         """Return class, file and line of the class attribute `units` if it names the variable."""
@@ -135,16 +139,12 @@ class PythonFmuComponent(Component):
             (self._pythonfmu_variables[v.name].setter, array, part.start)
             for v, array, part in inputs.elements()
         ]
-        self._getters = [
-            (
-                v.name,
-                self._pythonfmu_variables[v.name].getter,
-                *_OUTPUT_TYPES[v.type],
-                array,
-                part.start,
-            )
-            for v, array, part in outputs.elements()
-        ]
+        self._getters = []
+        for variable, array, part in outputs.elements():
+            name, kind = variable.name, self._kinds[variable.name]
+            getter = self._pythonfmu_variables[name].getter
+            target = (kind.usual_type, kind.convert, array, part.start)
+            self._getters.append((name, getter, *target))
 
     def set_inputs(self) -> None:
         """Pass the bound input values to the slave's setters."""
@@ -171,19 +171,15 @@ class PythonFmuComponent(Component):
             try:
                 array[index] = value if value.__class__ is usual_type else convert(value)
             except (TypeError, ValueError, OverflowError):
-                text = (
-                    f'output "{name}" is {shorten(repr(value))}, expected '
-                    f"{_EXPECTED[self._types[name]]}"
-                )
+                expected = self._kinds[name].expected
+                text = f'output "{name}" is {shorten(repr(value))}, expected {expected}'
                 raise ComponentError(self._name, "get_outputs", text, self._time) from None
 
     def get_state(self) -> Any:
         """Return the slave's own state, or a snapshot of its attributes."""
-        return (
-            self._slave._get_fmu_state()
-            if self._has_custom_state
-            else snapshot(self._slave, PYTHONFMU_ATTRIBUTES)
-        )
+        if self._has_custom_state:
+            return self._slave._get_fmu_state()
+        return snapshot(self._slave, PYTHONFMU_ATTRIBUTES)
 
     def set_state(self, state: Any) -> None:
         """Restore a state that `get_state` returned."""
@@ -200,7 +196,10 @@ class PythonFmuComponent(Component):
         """Do nothing: the slave is garbage-collected."""
 
     def _call_user_code(self, function: str, call: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a method of the slave, convert its exceptions to ComponentError and forward its log messages."""
+        """Call a method of the slave.
+
+        Its exceptions become a ComponentError, and its log messages are forwarded.
+        """
         try:
             return call(*arguments)
         except (*PASS_THROUGH_EXCEPTIONS, ComponentError):
@@ -223,8 +222,8 @@ class PythonFmuComponent(Component):
         self._slave.log_queue.clear()
 
 
-def _fmi_type(registered: ScalarVariable) -> str:
-    return next(name for kind, name in _TYPES.items() if isinstance(registered, kind))
+def _find_kind(registered: ScalarVariable) -> _Kind:
+    return next(kind for base, kind in _KINDS.items() if isinstance(registered, base))
 
 
 def _to_variable(registered: ScalarVariable, unit: str | None) -> Variable:
@@ -232,7 +231,7 @@ def _to_variable(registered: ScalarVariable, unit: str | None) -> Variable:
     causality: Any = registered.causality.name if registered.causality else "local"
     return Variable(
         registered.name,
-        _fmi_type(registered),
+        _find_kind(registered).fmi_type,
         causality,
         registered.variability.name if registered.variability else "continuous",
         _start_value(registered) if causality in ("parameter", "input") else None,
@@ -253,19 +252,19 @@ def _start_value(registered: ScalarVariable) -> Any:
 def checked_units(
     units: Any, types: Mapping[str, str], owner: type | None = None
 ) -> Mapping[str, str]:
-    """Return the attribute `units` of a PythonFMU class, such as `{"rudder_angle": "rad"}`, after a check.
+    """Return the attribute `units` of a PythonFMU class after a check.
 
     Args:
-        units: Value of the attribute.
+        units: Value of the attribute, such as `{"rudder_angle": "rad"}`.
         types: FMI 3.0 type of each variable of the class.
         owner: The class, for messages.
 
     Raises:
-        InputError: The attribute is not a dict of texts, names a variable that does not exist or is not of type Real, or contains
-            an unknown unit.
+        InputError: The attribute is not a dict of texts, names a variable that does not exist or is
+            not of type Real, or contains an unknown unit.
     """
     if not isinstance(units, Mapping) or not all(
-        isinstance(text, str) for item in units.items() for text in item
+        isinstance(text, str) for text in (*units, *units.values())
     ):
         raise _refusal(owner, "is not a dict of names of variables and units")
     numbers = [name for name, kind in types.items() if kind == "Float64"]
@@ -274,18 +273,15 @@ def checked_units(
         if fault := _find_fault(name, unit, numbers):
             names_by_fault[fault].append(f'"{name}"')
     if names_by_fault:
-        raise _refusal(
-            owner,
-            *(
-                fault.format(names=abbreviate_names(names, 4))
-                for fault, names in names_by_fault.items()
-            ),
-        )
+        faults = []
+        for fault, names in names_by_fault.items():
+            faults.append(fault.format(names=abbreviate_names(names, 4)))
+        raise _refusal(owner, *faults)
     return units
 
 
 def units_place(owner: type) -> str:
-    """Return the attribute `units` with the class that defines it, its file and line, as far as they are known."""
+    """Return the place of the attribute `units`: its class, file and line, as far as known."""
     kind = next((each for each in owner.__mro__ if "units" in vars(each)), owner)
     try:
         lines, first = inspect.getsourcelines(kind)
@@ -293,18 +289,17 @@ def units_place(owner: type) -> str:
         file = Path(inspect.getfile(kind)).name
     except (OSError, TypeError, ValueError, SyntaxError):
         return f"{kind.__name__}.units"
-    names = ((node.lineno, ast.unparse(node)) for node in getattr(definition, "body", ()))
-    line = next(
-        (number for number, text in names if text.partition(" ")[0].rstrip(":") == "units"), 1
-    )
+    line = 1
+    for node in getattr(definition, "body", ()):
+        if ast.unparse(node).partition(" ")[0].rstrip(":") == "units":
+            line = node.lineno
+            break
     return f"{kind.__name__}.units ({file}:{first + line - 1})"
 
 
 def _refusal(owner: type | None, *faults: str) -> InputError:
-    attribute = (
-        f"the class attribute {units_place(owner)}" if owner else 'the class attribute "units"'
-    )
-    return InputError([Problem(f"{attribute} {fault}") for fault in faults])
+    attribute = units_place(owner) if owner else '"units"'
+    return InputError([Problem(f"the class attribute {attribute} {fault}") for fault in faults])
 
 
 def _find_fault(name: str, unit: str, numbers: Collection[str]) -> str:

@@ -67,7 +67,7 @@ def load_object(reference: str, folder: Path) -> Any:
 
 
 def package_root(path: Path) -> Path:
-    """Return the folder that contains a file's outermost package, or the file's own folder if it is in no package."""
+    """Return the folder with a file's outermost package, or its own folder if it is in none."""
     root = path.parent
     while (root / "__init__.py").is_file():
         root = root.parent
@@ -75,15 +75,21 @@ def package_root(path: Path) -> Path:
 
 
 def package_files(paths: Iterable[Path]) -> set[Path]:
-    """Return Python files, and all modules and JSON files of their folder or outermost package that they can use."""
+    """Return Python files and the files that they can use.
+
+    These are the imported files of their folder, or all modules and JSON files of their outermost
+    package.
+    """
     files = {path.resolve() for path in paths}
-    packages = {
-        root / path.relative_to(root).parts[0]
-        for path in files
-        if (root := package_root(path)) != path.parent
-    }
-    siblings = (_imported_siblings(path) for path in files if package_root(path) == path.parent)
-    return files.union(*siblings, *map(_modules_and_data, packages))
+    used, packages = set(files), set()
+    for path in files:
+        root = package_root(path)
+        if root != path.parent:
+            packages.add(root / path.relative_to(root).parts[0])
+            continue
+        with suppress(OSError, ValueError, SyntaxError):  # its import reports them
+            used.update(with_imported_siblings(path))
+    return used.union(*map(_modules_and_data, packages))
 
 
 def _modules_and_data(package: Path) -> list[Path]:
@@ -91,22 +97,10 @@ def _modules_and_data(package: Path) -> list[Path]:
 
     One walk takes a third of the time of two `rglob`.
     """
-    return [
-        Path(folder, name)
-        for folder, _, names in os.walk(package)
-        for name in names
-        if name.endswith((".py", ".json"))
-    ]
-
-
-def _imported_siblings(path: Path) -> list[Path]:
-    """Return the files beside a file that it imports.
-
-    None if it cannot be read, which its import reports.
-    """
-    with suppress(OSError, ValueError, SyntaxError):
-        return with_imported_siblings(path)
-    return []
+    files: list[Path] = []
+    for folder, _, names in os.walk(package):
+        files += [Path(folder, name) for name in names if name.endswith((".py", ".json"))]
+    return files
 
 
 def import_shipped(module: str) -> ModuleType:
@@ -152,7 +146,7 @@ def _is_importable(package: Path) -> bool:
 
 
 def _unique_name(root: Path, parts: Sequence[str]) -> str:
-    """Return the name of a module below a namespace package that is named by the path of its root folder."""
+    """Return the name of a module below the namespace package of its root folder."""
     unique = f"{_NAMESPACE_PREFIX}{sha256(str(root).encode()).hexdigest()[:12]}"
     if unique not in sys.modules:
         namespace = ModuleType(unique)
@@ -164,7 +158,7 @@ def _unique_name(root: Path, parts: Sequence[str]) -> str:
 
 
 class _FolderFinder(MetaPathFinder):
-    """Finder of files in folders that are no packages, below the namespace packages of `_import_file`."""
+    """Finder of files in folders that are no packages, for `_import_file`."""
 
     def find_spec(
         self, name: str, path: Sequence[str] | None, _target: object = None
@@ -214,17 +208,20 @@ def with_imported_siblings(path: Path) -> list[Path]:
     """
     files, new = [path], [path] if path.suffix == ".py" else []
     while new:
-        imported = {file.resolve() for known in new for file in _imported_files(known, path.parent)}
+        imported: set[Path] = set()
+        for known in new:
+            imported.update(file.resolve() for file in _imported_files(known, path.parent))
         new = sorted(imported - {file.resolve() for file in files})
         files += new
     return files
 
 
 def read_with_relative_imports(path: Path, root: Path) -> str:
-    """Return the text of a Python file in which absolute imports of modules of the folder `root` are relative.
+    """Return the text of a Python file with relative imports of the modules of the folder `root`.
 
-    All statements keep their lines. Modules of the standard library, cosim and PythonFMU take precedence over files of the same
-    name. A file in a package (a folder with `__init__.py`) is not changed.
+    All statements keep their lines. Modules of the standard library, cosim and PythonFMU take
+    precedence over files of the same name. A file in a package (a folder with `__init__.py`) is not
+    changed.
 
     Raises:
         SyntaxError: The file cannot be parsed.
@@ -234,24 +231,17 @@ def read_with_relative_imports(path: Path, root: Path) -> str:
     lines = text.encode().splitlines(keepends=True)  # the columns of `ast` count bytes
     is_changed = path.is_relative_to(root) and not (path.parent / "__init__.py").is_file()
     dots = "." * len(path.relative_to(root).parts) if is_changed else ""
-    nodes = [
-        node
-        for node in ast.walk(ast.parse(text, str(path)))
-        if isinstance(node, ast.Import | ast.ImportFrom)
-    ]
-    for node in (
-        sorted(nodes, key=lambda node: (node.lineno, node.col_offset), reverse=True) if dots else ()
-    ):
-        if _imports_sibling(node, root):
-            first, last = node.lineno - 1, (node.end_lineno or node.lineno) - 1
-            before, after = lines[first][: node.col_offset], lines[last][node.end_col_offset :]
-            lines[first] = (
-                before
-                + _relative_statements(node, dots, root).encode()
-                + b" \\\n" * (last - first)
-                + after
-            )
-            del lines[first + 1 : last + 1]
+    nodes = []
+    for node in ast.walk(ast.parse(text, str(path))):
+        if dots and isinstance(node, ast.Import | ast.ImportFrom) and _imports_sibling(node, root):
+            nodes.append(node)
+    # from the end, so that the places of earlier statements stay as they are
+    for node in sorted(nodes, key=lambda node: (node.lineno, node.col_offset), reverse=True):
+        first, last = node.lineno - 1, (node.end_lineno or node.lineno) - 1
+        before, after = lines[first][: node.col_offset], lines[last][node.end_col_offset :]
+        statements = _relative_statements(node, dots, root).encode()
+        lines[first] = before + statements + b" \\\n" * (last - first) + after
+        del lines[first + 1 : last + 1]
     return b"".join(lines).decode()[:-1]
 
 
@@ -277,22 +267,20 @@ def _is_sibling(module: str, root: Path) -> bool:
 def _relative_statements(node: ast.Import | ast.ImportFrom, dots: str, root: Path) -> str:
     if isinstance(node, ast.ImportFrom):
         return ast.unparse(ast.ImportFrom(f"{dots}{node.module}", node.names, 0))
-    return "; ".join(
-        _relative_import(alias, dots) if _is_sibling(alias.name, root) else _import(alias)
-        for alias in node.names
-    )
-
-
-def _import(alias: ast.alias) -> str:
-    return ast.unparse(ast.Import([alias]))
+    statements = []
+    for alias in node.names:
+        if _is_sibling(alias.name, root):
+            statements.append(_relative_import(alias, dots))
+        else:
+            statements.append(ast.unparse(ast.Import([alias])))
+    return "; ".join(statements)
 
 
 def _relative_import(alias: ast.alias, dots: str) -> str:
     package, _, module = alias.name.rpartition(".")
     if alias.asname or not package:
-        return f"from {dots}{package} import {module}" + (
-            f" as {alias.asname}" if alias.asname else ""
-        )
+        renamed = f" as {alias.asname}" if alias.asname else ""
+        return f"from {dots}{package} import {module}{renamed}"
     top = package.partition(".")[0]
     return f"from {dots} import {top}; from {dots}{package} import {module} as _{module}"
 
@@ -302,17 +290,13 @@ def _imported_files(path: Path, root: Path) -> Iterator[Path]:
         if isinstance(node, ast.ImportFrom) and node.level:
             folder = path.resolve().parents[node.level - 1]
             base = folder.joinpath(*(node.module or "").split("."))
-            submodules = (base / alias.name for alias in node.names)
-            named = (module for module in (base, *submodules) if module != folder)
-            modules = (file for module in named if (file := module.with_suffix(".py")).is_file())
-            yield from modules
-            yield from _package_files(folder, base)
-
-
-def _package_files(folder: Path, base: Path) -> Iterator[Path]:
-    """Yield the `__init__.py` of every package below `folder` that contains `base`."""
-    for package in (base, *base.parents):
-        if package == folder:
-            return
-        if (package / "__init__.py").is_file():
-            yield package / "__init__.py"
+            candidates = []
+            for module in (base, *(base / alias.name for alias in node.names)):
+                if module != folder:
+                    candidates.append(module.with_suffix(".py"))
+            # the packages below the folder that contain the module
+            for package in (base, *base.parents):
+                if package == folder:
+                    break
+                candidates.append(package / "__init__.py")
+            yield from filter(Path.is_file, candidates)

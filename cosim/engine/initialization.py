@@ -65,13 +65,9 @@ def copy_start_values(component: Component, ports: Ports) -> None:
 
     Inputs without a connection keep them.
     """
-    filled = dict.fromkeys(ports.arrays, 0)
-    for variable in ports.variables:
-        begin = filled[variable.dtype]
-        filled[variable.dtype] += len(variable.scalar_names)
-        if variable.derivative_of:
-            continue
-        ports.arrays[variable.dtype][begin : filled[variable.dtype]] = component.get(variable.name)
+    for variable, array, part in ports.elements():
+        if not variable.derivative_of:
+            array[part] = component.get(variable.name)
 
 
 #: sweeps beyond one per component before Newton's method, for loops that are contractions; relative

@@ -6,12 +6,11 @@ import html
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from ..core.errors import CosimError, InputError
+from ..core.errors import InputError
 from ..core.text import count_noun
 from ..results import Result
-from .figures import STYLE, draw_figure, figure_style, figure_to_svg
-from .run_page import render_report
-from .runs import load_figures
+from .figures import STYLE, figure_style, figure_to_svg
+from .run_page import draw_scenario_figures, render_report
 from .tables import format_number
 
 if TYPE_CHECKING:
@@ -43,7 +42,9 @@ def result_as_html(result: Result) -> str:
             lines.append(f"<tr>{cells}</tr>")
         lines += ["</tbody></table>"]
     if len(result.time):
-        page = html.escape(render_report(result, result.checks, _figures(result)), quote=True)
+        page = html.escape(
+            render_report(result, result.checks, draw_scenario_figures(result)), quote=True
+        )
         style = f"width:100%;height:{_HEIGHT}px;border:1px solid #ccc"
         lines.append(f'<iframe sandbox="allow-scripts" style="{style}" srcdoc="{page}"></iframe>')
     return "\n".join(lines)
@@ -56,19 +57,6 @@ def _kpi_rows(result: Result) -> Iterator[tuple[str, str, str, str]]:
         outcome = checks.get(name)
         check = f"{outcome.limits} {'✓' if outcome.passed else '✗'}" if outcome else ""
         yield name, format_number(value), units.get(name, ""), check
-
-
-def _figures(result: Result) -> Iterator[tuple[str, str]]:
-    """Yield name and SVG of each figure of the scenario.
-
-    A result that ended early may lack what a figure needs.
-    """
-    for name, function, arguments in load_figures(result):
-        try:
-            yield name, figure_to_svg(draw_figure(result, name, function, arguments))
-        except CosimError:
-            if not result.metadata.get("failure"):
-                raise
 
 
 def plot_signals(result: Result, patterns: Sequence[str]) -> Figure:

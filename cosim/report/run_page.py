@@ -219,7 +219,7 @@ def write_folder_report(
     run.metadata["deviation"] = (
         list(_deviation_lines(run, deviation, is_accepted)) if deviation else []
     )
-    write_report(run, outcomes, _draw_figures(run, [*more_figures, *load_figures(run)]), target)
+    write_report(run, outcomes, draw_scenario_figures(run, more_figures), target)
 
 
 def _deviation_lines(run: Result, deviation: Deviation, is_accepted: bool) -> Iterator[str]:
@@ -237,9 +237,18 @@ def _deviation_lines(run: Result, deviation: Deviation, is_accepted: bool) -> It
     yield from (note[0].upper() + note[1:] for note in notes if note)
 
 
-def _draw_figures(run: Result, figures: Iterable[NamedCall]) -> Iterator[tuple[str, str]]:
-    """Yield name and SVG text of the figures."""
-    for name, function, arguments in figures:
+def draw_scenario_figures(
+    run: Result, more_figures: Iterable[NamedCall] = ()
+) -> Iterator[tuple[str, str]]:
+    """Yield name and SVG text of the figures of a run's scenario.
+
+    The result of a run that failed may lack what a figure needs. Such a figure is logged.
+
+    Args:
+        run: The run.
+        more_figures: Figures that are drawn before those of the scenario.
+    """
+    for name, function, arguments in [*more_figures, *load_figures(run)]:
         try:
             yield name, figure_to_svg(draw_figure(run, name, function, arguments))
         except CosimError as error:

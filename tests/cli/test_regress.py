@@ -10,7 +10,7 @@ from cosim_command import run_cosim
 from lxml import etree
 
 from cosim.cli.commands import regress as regress_command
-from cosim.studies import regression_runs
+from cosim.studies import regression
 from cosim.studies.regression import RegressionOutcome
 
 COOLING = """
@@ -198,7 +198,7 @@ def test_a_folder_without_scenarios_is_told_that_the_shipped_ones_are_run(folder
     monkeypatch.chdir(folder / "scenarios")
     outcome = RegressionOutcome("demo1_box", 0, "5 checks")
     monkeypatch.setattr(
-        regression_runs,
+        regression,
         "run_regressions",
         lambda folders, *_: [outcome] if folders[0].is_absolute() else [],
     )

@@ -73,7 +73,10 @@ from pythonfmu import Fmi2Causality, Fmi2Slave, Real
 
 class Base(Fmi2Slave):
     author = "someone"
-    units: dict[str, str] = {f"{name}[{i}]": unit for name, unit in (("x", "rad"), ("y", "m")) for i in (1, 2, 3)}
+    units: dict[str, str] = {
+        **{f"x[{i}]": "rad" for i in (1, 2, 3)},
+        **{f"y[{i}]": "m" for i in (1, 2, 3)},
+    }
 
 
 class Both(Base):
@@ -81,7 +84,8 @@ class Both(Base):
         super().__init__(**arguments)
         for name, causality in (("x", Fmi2Causality.input), ("y", Fmi2Causality.output)):
             for i in (1, 2, 3):
-                self.register_variable(Real(f"{name}[{i}]", causality=causality, getter=lambda: 0.0, setter=lambda _: None))
+                access = {"getter": lambda: 0.0, "setter": lambda _: None}
+                self.register_variable(Real(f"{name}[{i}]", causality=causality, **access))
 
     def do_step(self, time, step_size):
         return True

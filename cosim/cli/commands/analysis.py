@@ -14,7 +14,7 @@ from ...core.errors import InputError
 from ...core.text import count_noun
 from ...report.tables import print_table
 from ..messages import print_json, print_log
-from ..options import json_option, scenario_argument, settings_option
+from ..options import PATH, json_option, scenario_argument, settings_option
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,7 +54,7 @@ duration_option = click.option(
 )
 @click.option(
     "--output",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="Scenario file to write; it extends SCENARIO by the found values.",
 )
 @json_option("an object with found, parameters, residuals and evaluations")
@@ -174,12 +174,12 @@ def _print_trim(found: Trim, output: Path | None) -> None:
     "--output",
     "files",
     multiple=True,
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="File for the model: .json, .csv or .mat.",
 )
 @click.option(
     "--figures",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="Folder for a Bode diagram, the poles and step responses.",
 )
 @json_option(
@@ -298,9 +298,7 @@ def _draw_model(model: LinearModel, folder: Path, duration: float | None) -> Non
 @click.option(
     "--amplitude", type=float, help="Largest value that --estimate adds, in the unit of the signal."
 )
-@click.option(
-    "--figures", type=click.Path(path_type=Path), help="Folder for a Bode and a Nyquist diagram."
-)
+@click.option("--figures", type=PATH, help="Folder for a Bode and a Nyquist diagram.")
 @json_option(
     "an object with time, step, and loops: objects with the margins; phases in rad, gains as "
     "factors"

@@ -29,7 +29,7 @@ from ..bench_output import (
 )
 from ..forked_commands import forked_commands
 from ..messages import print_json
-from ..options import complete_role, complete_scenario, json_option
+from ..options import PATH, complete_role, complete_scenario, jobs_option, json_option
 
 if TYPE_CHECKING:
     from ...studies.controller_bench.trials import ControllerTrials, TrialResult
@@ -65,22 +65,18 @@ _COSTS_FILE = "costs.json"
     "--scenarios",
     multiple=True,
     metavar="DIR|SCENARIO",
-    type=click.Path(path_type=Path),
+    type=PATH,
     shell_complete=complete_scenario,
     help="Scenarios to run; default: the folder scenarios/ here, else the shipped ones.",
 )
 @click.option(
     "--output-dir",
-    type=click.Path(path_type=Path),
+    type=PATH,
     default=Path("runs/bench"),
     show_default=True,
     help="Folder for the results.",
 )
-@click.option(
-    "--jobs",
-    type=click.IntRange(min=1),
-    help="Number of scenarios at a time; default: one per processor.",
-)
+@jobs_option
 @json_option(
     "an object with candidate, role, ranking, scenarios (name, applicable, code, seconds, "
     "problems, ignored_settings, "
@@ -141,17 +137,6 @@ def _check_sources(sources: Sequence[str], settings: Sequence[str]) -> None:
         )
 
 
-class _RefusedError(Exception):
-    """A controller was refused or crashed while it was examined.
-
-    The child process has printed why.
-    """
-
-    def __init__(self, code: int):
-        super().__init__(code)
-        self.code = code
-
-
 @dataclass(frozen=True)
 class _Bench:
     """Benchmark of controllers in the scenarios of a role."""
@@ -170,10 +155,7 @@ class _Bench:
         """Benchmark a controller against those that the scenarios contain."""
         from ...studies.controller_bench.page import write_bench_page
 
-        try:
-            trials = self._run_trials(source, settings)
-        except _RefusedError as refused:
-            return refused.code
+        trials = self._run_trials(source, settings)
         write_bench_page(self.role, [trials.as_benched()], self._page)
         if self.as_json:
             print_json({"role": self.role, **trials.as_json()})
@@ -194,14 +176,11 @@ class _Bench:
 
         everything: list[ControllerTrials] = []
         progress = BenchProgress(len(sources), quiet=self.as_json)
-        try:
-            for source in sources:
-                progress.print_next(parse_source(source).name)
-                everything.append(self._run_trials(source, {}))
-            progress.print_costs()
-            reference, costs = self._measure_costs(everything)
-        except _RefusedError as refused:
-            return refused.code
+        for source in sources:
+            progress.print_next(parse_source(source).name)
+            everything.append(self._run_trials(source, {}))
+        progress.print_costs()
+        reference, costs = self._measure_costs(everything)
         benched = [
             trials.as_benched(cost, costs[0])
             for trials, cost in zip(everything, costs[1:], strict=True)
@@ -270,7 +249,7 @@ class _Bench:
         try:
             if measured:
                 found = _in_child(lambda: write_costs(self.role, [*measured.values()], file), file)
-        except _RefusedError:  # the child process has printed why
+        except click.exceptions.Exit:  # the child process has printed why
             pass
         except ComponentError as error:
             click.echo(f"WARNING no cost is measured: {error}", err=True)
@@ -283,13 +262,14 @@ class _Bench:
 def _in_child(work: Callable[[], None], file: Path) -> Any:
     """Do work that executes foreign code in a child process.
 
-    Return the content of the JSON file that it writes.
+    Return the content of the JSON file that it writes. If the child process was refused or failed,
+    it has printed why, and the command ends with its exit code.
     """
 
     def run() -> int:
         work()
         return 0
 
-    if code := supervision.run_supervised_command(run, "run", lambda _outcome: None):
-        raise _RefusedError(code)
+    if code := supervision.run_supervised_command(run):
+        raise click.exceptions.Exit(code)
     return json.loads(file.read_text(encoding="utf-8"))

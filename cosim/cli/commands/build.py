@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ...core.errors import CheckError, InputError, Problem, nearest_file
+from ..options import PATH
 from .new_vehicle import read_vehicle_file
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--output",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="Export a single source, in any folder, to this FMU.",
 )
 @click.option(
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--library",
-    type=click.Path(path_type=Path),
+    type=PATH,
     multiple=True,
     metavar="DIR",
     help=(

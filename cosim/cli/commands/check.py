@@ -12,7 +12,7 @@ from ...core.system import Group, Stage
 from ...core.text import count_noun
 from .. import strict_sandbox, supervision
 from ..messages import collect_log, print_json
-from ..options import complete_scenario, json_option
+from ..options import json_option, scenario_argument, settings_option
 
 if TYPE_CHECKING:
     from ...core.component import Variable
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 
 @click.command(cls=strict_sandbox.SandboxCommand)
-@click.argument("scenario", shell_complete=complete_scenario)
-@click.option("--set", "settings", multiple=True, metavar="NAME=value", help="As for `cosim run`.")
+@scenario_argument
+@settings_option
 @click.option("--connections/--no-connections", default=True, help="List every connection.")
 @click.option(
     "--expanded",

@@ -8,18 +8,16 @@ from pathlib import Path
 import click
 
 from ..messages import print_log, progress_bar
-from ..options import complete_scenario, csv_option, page_option
+from ..options import PATH, complete_scenario, csv_option, page_option
 
 FORMATS = ("png", "svg")
 
 
 @click.command()
-@click.argument(
-    "results", nargs=-1, required=True, metavar="RESULT...", type=click.Path(path_type=Path)
-)
+@click.argument("results", nargs=-1, required=True, metavar="RESULT...", type=PATH)
 @click.option(
     "--output-dir",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="Folder for the figures; default: that of the result.",
 )
 @click.option(
@@ -88,15 +86,15 @@ def _print_paths(files: Iterable[Path]) -> None:
 
 
 @click.command()
-@click.argument("result", type=click.Path(path_type=Path))
+@click.argument("result", type=PATH)
 @click.option(
     "--output-file",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="File of the page; default: report.html in the folder of RESULT.",
 )
 @click.option(
     "--reference",
-    type=click.Path(path_type=Path),
+    type=PATH,
     shell_complete=complete_scenario,
     metavar="RESULT|SCENARIO",
     help=(
@@ -129,11 +127,11 @@ def report(result: Path, output_file: Path | None, reference: Path | None, open_
 
 
 @click.command()
-@click.argument("result", type=click.Path(path_type=Path))
-@click.argument("other", required=False, type=click.Path(path_type=Path))
+@click.argument("result", type=PATH)
+@click.argument("other", required=False, type=PATH)
 @click.option(
     "--output-file",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="File of the page; default: replay.html in the folder of RESULT.",
 )
 @page_option

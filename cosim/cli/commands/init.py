@@ -15,6 +15,7 @@ import click
 from ...core import __version__, resources
 from ...core.errors import InputError, Problem, abbreviate_names
 from ...studies.regression import Regression
+from ..options import PATH
 
 _TEMPLATES = Path(__file__).parents[1] / "templates"
 #: template of each file of a new project
@@ -33,7 +34,7 @@ _PLANT = "fmus/strider.fmu"
 
 
 @click.command()
-@click.argument("directory", type=click.Path(path_type=Path))
+@click.argument("directory", type=PATH)
 @click.option("--force", is_flag=True, help="Overwrite existing files.")
 def command(directory: Path, force: bool) -> int:
     """Create a project in DIRECTORY with a controller, a scenario, its reference, tests and CI.

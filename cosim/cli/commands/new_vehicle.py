@@ -15,7 +15,7 @@ import click
 from ...core import resources
 from ...core.errors import InputError, Problem, did_you_mean
 from ...scenario.json_document import Document, read_document
-from ..options import new_file_options
+from ..options import PATH, new_file_options
 
 _Result = TypeVar("_Result")
 
@@ -35,14 +35,14 @@ _SCENARIO_KEYS = frozenset({"components", "extends", "scenario"})
 @new_file_options()
 @click.option(
     "--urdf",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help=(
         "URDF file with the mass, inertia and collision shape, unless the file of --from has them."
     ),
 )
 @click.option(
     "--mesh",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help=(
         "STL, OBJ or GLB file with the shape: inertia for an even density, convex collision "
         "pieces, appearance. Requires the extra mesh."

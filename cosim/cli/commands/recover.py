@@ -10,6 +10,7 @@ import click
 
 from ...core.errors import CosimError, InputError
 from ...core.text import count_noun
+from ..options import PATH
 from ..unfinished_runs import OutputFiles, how_to_recover
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("output", type=click.Path(path_type=Path))
+@click.argument("output", type=PATH)
 def command(output: Path) -> None:
     """Write the results of a run that could not write them (as on a full disk) or that was killed.
 

@@ -13,7 +13,7 @@ import click
 from ...core.resources import available_processors
 from ...core.text import count_noun
 from ..messages import print_json, print_outcome
-from ..options import complete_scenario, json_option
+from ..options import PATH, complete_scenario, jobs_option, json_option
 
 if TYPE_CHECKING:
     from ...studies.regression import RegressionOutcome
@@ -24,8 +24,8 @@ _INVALID_XML_CHARACTERS = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U0001000
 
 
 @click.command()
-@click.argument("result", type=click.Path(path_type=Path))
-@click.argument("reference", type=click.Path(path_type=Path), shell_complete=complete_scenario)
+@click.argument("result", type=PATH)
+@click.argument("reference", type=PATH, shell_complete=complete_scenario)
 @click.option("--absolute", default=0.0, help="Tolerance of values, in the unit of each signal.")
 @click.option(
     "--relative",
@@ -41,7 +41,7 @@ _INVALID_XML_CHARACTERS = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U0001000
 )
 @click.option(
     "--plot",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="FILE",
     help="Draw the worst signals in their tubes (PNG or SVG).",
 )
@@ -97,28 +97,24 @@ def compare(
     "scenarios",
     nargs=-1,
     metavar="[DIR|SCENARIO...]",
-    type=click.Path(path_type=Path),
+    type=PATH,
     shell_complete=complete_scenario,
 )
 @click.option("--update", is_flag=True, help="Write new references from these runs.")
 @click.option(
     "--junit",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="FILE.xml",
     help="Also write the outcomes as JUnit XML.",
 )
 @click.option(
     "--output-dir",
-    type=click.Path(path_type=Path),
+    type=PATH,
     default=Path("runs"),
     show_default=True,
     help="Folder for the results.",
 )
-@click.option(
-    "--jobs",
-    type=click.IntRange(min=1),
-    help="Number of scenarios at a time; default: one per processor.",
-)
+@jobs_option
 @json_option(
     "an object with failed, their number, and scenarios, a list of name, code, summary, details, "
     "seconds and accept"

@@ -15,7 +15,12 @@ from ...core.errors import InputError, Problem
 from ...process.output_lock import LockKeeper
 from .. import live, strict_sandbox, supervision
 from ..messages import log_problems, print_log, progress_bar, warn_overwriting
-from ..options import complete_scenario, csv_option, json_option
+from ..options import (
+    csv_option,
+    json_option,
+    output_dir_option,
+    scenario_argument,
+)
 from ..run_outputs import RunOptions, RunOutcome, save_after_crash, write_outputs
 from ..unfinished_runs import OutputFiles
 
@@ -39,12 +44,8 @@ RESULT_FILES = (
 
 
 @click.command(cls=strict_sandbox.SandboxCommand)
-@click.argument("scenario", shell_complete=complete_scenario)
-@click.option(
-    "--output-dir",
-    type=click.Path(path_type=Path),
-    help="Folder for the results; default: runs/NAME.",
-)
+@scenario_argument
+@output_dir_option
 @click.option("--stop-time", help="Stop time (s), instead of the scenario's.")
 @click.option("--step-size", help="Macro step size (s), instead of the scenario's.")
 @click.option(

@@ -13,7 +13,7 @@ from ...process.output_lock import LOCK_FILE, LockKeeper, acquire_lock
 from ...process.temporary_folders import temporary_run_folder
 from .. import current_command_line, report_error, strict_sandbox, supervision
 from ..messages import print_json, print_line
-from ..options import csv_option, json_option
+from ..options import PATH, csv_option, json_option
 from ..unfinished_runs import OutputFiles, writing_results
 
 if TYPE_CHECKING:
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 
 @click.command(cls=strict_sandbox.SandboxCommand)
-@click.argument("fmu", type=click.Path(path_type=Path))
+@click.argument("fmu", type=PATH)
 @click.option(
     "--output-file",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="CSV file for the outputs; default: print their final values.",
 )
 @click.option("--stop-time", help="Stop time (s); default: the FMU's, else 1 s after the start.")
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--input-file",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help='CSV file with the column "time" and columns named like inputs.',
 )
 @click.option(

@@ -16,7 +16,7 @@ from ...core.text import count_noun
 from ...report.tables import print_table
 from .. import current_command_line, study_options
 from ..messages import print_json, warn_overwriting
-from ..options import complete_study, json_option
+from ..options import complete_study, json_option, output_dir_option
 
 if TYPE_CHECKING:
     from ...studies.execution.run_store import RunStore
@@ -32,11 +32,7 @@ _MAX_PRINTED = 20
 
 @click.command()
 @click.argument("sweep", shell_complete=complete_study)
-@click.option(
-    "--output-dir",
-    type=click.Path(path_type=Path),
-    help="Folder for the results; default: runs/NAME.",
-)
+@output_dir_option
 @click.option("--parquet", is_flag=True, help="Also write table.parquet (extra `parquet`).")
 @click.option(
     "--replays", is_flag=True, help="Also write the 3-D replay of one run of each cell of the maps."

@@ -13,7 +13,7 @@ from ...core.text import count_noun
 from ...report.tables import print_table
 from .. import study_options
 from ..messages import print_json
-from ..options import complete_study, json_option
+from ..options import complete_study, json_option, output_dir_option
 
 if TYPE_CHECKING:
     from ...studies.execution.run_store import RunStore
@@ -23,11 +23,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("tuning", metavar="TUNE", shell_complete=complete_study)
-@click.option(
-    "--output-dir",
-    type=click.Path(path_type=Path),
-    help="Folder for the results; default: runs/NAME.",
-)
+@output_dir_option
 @json_option(
     "the object of best.json, with failure, the reason why no point is feasible, or null; with "
     "--worst that of worst.json"

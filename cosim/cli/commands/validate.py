@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..messages import print_json
-from ..options import json_option
+from ..options import PATH, json_option
 
 if TYPE_CHECKING:
     from ...components.fmi.preflight import Finding
 
 
 @click.command()
-@click.argument("fmus", metavar="FMU...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("fmus", metavar="FMU...", nargs=-1, required=True, type=PATH)
 @json_option("a list of findings with file, severity, rule, source, member, line and message")
 def command(fmus: tuple[Path, ...], as_json: bool) -> int:
     """Validate FMUs against the FMI standard without running them.

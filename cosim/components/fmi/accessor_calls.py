@@ -1,4 +1,4 @@
-"""Prepared calls of fmi*Get... and fmi*Set... functions, which transfer the bound variables of an instance."""
+"""Prepared calls of fmi*Get... and fmi*Set..., which transfer the bound variables."""
 
 from __future__ import annotations
 
@@ -92,10 +92,10 @@ class AccessorCallFactory:
     def _prepare_slopes(
         self, verb: Literal["Get", "Set"], variables: Sequence[Variable], slopes: np.ndarray
     ) -> PreparedCall:
-        """Prepare the call that gets the first time derivatives of outputs, or sets those of inputs.
+        """Prepare the call that gets the slopes of outputs, or sets those of inputs.
 
-        For the native executor it is a call with the arguments of FMI 3.0, whose last one has the size of a pointer. The function
-        of FMI 3.0 has one more argument, and is called from Python.
+        For the native executor it is a call with the arguments of FMI 3.0, whose last one has the
+        size of a pointer. The function of FMI 3.0 has one more argument, and is called from Python.
         """
         count, name = (
             len(variables),

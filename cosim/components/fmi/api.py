@@ -126,7 +126,7 @@ class FmiApi(ABC):
 
     @abstractmethod
     def enter_initialization(self, start_time: float, stop_time: float) -> None:
-        """Call the functions that set up the experiment and enter the initialization; times in s."""
+        """Set up the experiment and enter the initialization; times in s."""
 
     @abstractmethod
     def prepare_do_step(self, step_size: float, flags: StepFlags) -> list[PreparedCall]:
@@ -347,7 +347,7 @@ class FmiApi(ABC):
         return self.prefix + function[0].upper() + function[1:]
 
     def restore_float_mode(self, function: str) -> None:
-        """Restore the default floating-point mode if the last call, one of `function`, changed it."""
+        """Restore the default floating-point mode if the last call, of `function`, changed it."""
         if float_mode.is_changed() or float_mode.enabled_traps():
             self._float_mode.restore(self.name, function, self.current_time.value)
 

@@ -29,12 +29,11 @@ def find_changed_sources(file: FmuFile) -> list[Path]:
     They are searched beside the FMU. For an FMU in the folder `fmus` of a project they are searched
     in `controllers`, its subfolders and the project folder too.
     """
-    sources = _find_sources(file).items()
-    return [
-        source
-        for source, checksums in sources
-        if not any(crc32(content) in checksums for content in _contents(source))
-    ]
+    changed = []
+    for source, checksums in _find_sources(file).items():
+        if set(map(crc32, _contents(source))).isdisjoint(checksums):
+            changed.append(source)
+    return changed
 
 
 def changed_sources_warning(file: FmuFile) -> str:
@@ -73,10 +72,9 @@ def _find_sources(file: FmuFile) -> dict[Path, list[int]]:
         if folder in _FOLDERS and PurePosixPath(name).suffix in _SUFFIXES:
             copies.setdefault(name, []).append(checksum)
     for base in _source_folders(file.path.parent) if copies else ():
-        if found := {
-            base / name: copies[name] for name in sorted(copies) if (base / name).is_file()
-        }:
-            return found
+        names = [name for name in sorted(copies) if (base / name).is_file()]
+        if names:
+            return {base / name: copies[name] for name in names}
     return {}
 
 
@@ -86,11 +84,9 @@ def _source_folders(folder: Path) -> Iterator[Path]:
     project = folder.absolute().parent
     if folder.name == _FMUS:
         controllers = project / _CONTROLLERS
-        yield from (
-            controllers,
-            *sorted(each for each in controllers.glob("*") if each.is_dir()),
-            project,
-        )
+        yield controllers
+        yield from sorted(each for each in controllers.glob("*") if each.is_dir())
+        yield project
 
 
 def _contents(source: Path) -> Iterator[bytes]:

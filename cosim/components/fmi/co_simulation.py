@@ -116,7 +116,7 @@ class CoSimulationFmu(FmuDriver):
         return StepResult(reached, event_needed, terminate)
 
     def _accept_early_return(self, event_needed: bool) -> bool:
-        """Return whether a step that ended early, which is not declared, ended at a handled event."""
+        """Return whether a step with an undeclared early return ended at a handled event."""
         if not (event_needed and self._event_mode):
             return False
         self.api.may_return_early = True

@@ -137,9 +137,9 @@ class FmuDescription:
     def with_structural_parameters(
         self, values: Mapping[str, int], limits: PreflightLimits = DEFAULT_LIMITS
     ) -> FmuDescription:
-        """Return the description for other values of structural parameters, which change the shapes of arrays.
+        """Return the description for other values of structural parameters.
 
-        An array that changes its size loses its start value.
+        They change the shapes of arrays. An array that changes its size loses its start value.
 
         Args:
             values: Positive values of structural parameters by name.

@@ -177,7 +177,7 @@ class FmuDriver(FmuComponent):
     def prepare_step_calls(
         self, current_time: ctypes.c_double, step_size: float
     ) -> Sequence[PreparedCall]:
-        """Prepare the calls that set the inputs, make one step from `current_time`, get the outputs.
+        """Prepare the calls that set the inputs, make one step and get the outputs.
 
         Args:
             current_time: Memory from which the calls read the start of the step (s).

@@ -62,7 +62,10 @@ _idle_folders: dict[FileKey, ExtractedFolder] = {}
 
 
 def take_folder(key: FileKey) -> ExtractedFolder | None:
-    """Return the folder of an FMU that was extracted for an earlier run, if its files are unchanged; else None."""
+    """Return the folder of an FMU from an earlier run.
+
+    None if there is none, or if its files have changed.
+    """
     extracted = _idle_folders.pop(key, None)
     if extracted is None:
         return None
@@ -74,7 +77,10 @@ def take_folder(key: FileKey) -> ExtractedFolder | None:
 
 
 def keep_folder(key: FileKey, extracted: ExtractedFolder, library: str) -> None:
-    """Keep the folder for the next run, unless the operating system has kept the FMU's library with its static variables."""
+    """Keep the folder for the next run.
+
+    It is removed if the operating system has kept the FMU's library with its static variables.
+    """
     # no other run follows in a supervised process, which ends without finalizers
     if current_journal():
         extracted.folder.cleanup()
@@ -101,7 +107,7 @@ def remove_idle_folders() -> None:
 
 
 def list_files(folder: str) -> Listing:
-    """Return the files of a folder and of its subfolders, with all that changes when one of them is written."""
+    """Return the files below a folder, with all that changes when one of them is written."""
     listing: Listing = []
     folders = [folder]
     while folders:
@@ -179,7 +185,7 @@ class FmuFile:
         return description
 
     def _remember(self, part: str, read: Callable[[], Any]) -> Any:
-        """Return what is read from the file, which is read again only if its content has changed."""
+        """Return what is read from the file; read it only if its content is new."""
         if not self._key:
             return read()
         key = (part, self.limits, self._key)
@@ -263,7 +269,9 @@ class FmuFile:
         raise_errors(self.path, self.examination.binary_findings[self.description.interface])
 
     def acquire(self) -> Path:
-        """Extract the FMU if necessary and return the folder, which exists until the matching `release`.
+        """Extract the FMU if necessary and return the folder.
+
+        The folder exists until the matching `release`.
 
         Raises:
             InputError: The FMU does not pass the preflight check or cannot be extracted.

@@ -41,7 +41,10 @@ class GilHoldingFunction(CFuncPtr):
 
 
 class GilReleasingFunction(CFuncPtr):
-    """C function that is called without the global interpreter lock, because it may take long or log from other threads."""
+    """C function that is called without the global interpreter lock.
+
+    It may take long, or log from other threads.
+    """
 
     _flags_ = FUNCFLAG_CDECL
 
@@ -95,7 +98,10 @@ def load_library(file: FmuFile, folder: Path) -> Any:
 
 
 def _create_slave(description: FmuDescription, folder: Path) -> Any:
-    """Create FMPy's slave object without its constructor, which changes the working directory of all threads during the load."""
+    """Create FMPy's slave object without its constructor.
+
+    The constructor changes the working directory of all threads during the load.
+    """
     major, machine = description.major, current_platform()
     interface = "Model" if description.interface == "model-exchange" else "Slave"
     slave_class = getattr(import_module(f"fmpy.fmi{major}"), f"FMU{major}{interface}")

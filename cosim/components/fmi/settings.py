@@ -83,7 +83,11 @@ class InstanceSettings:
         return self.solver.method if self.solver else "cvode"
 
     def solver_tolerance(self, experiment: DefaultExperiment) -> float:
-        """Return the relative tolerance of a solver with variable step size for an FMU with this default experiment."""
+        """Return the relative tolerance of a solver with variable step size.
+
+        Args:
+            experiment: Default experiment of the FMU.
+        """
         return self.tolerance or experiment.tolerance or DEFAULT_TOLERANCE
 
     def solver_step_size(self, experiment: DefaultExperiment) -> Fraction | None:
@@ -94,7 +98,10 @@ class InstanceSettings:
         return (self.solver and self.solver.step_size) or experiment.step_size
 
     def describe_solver(self, experiment: DefaultExperiment) -> dict[str, Any]:
-        """Return the method with its tolerance or its largest step size (s; None: the communication step size)."""
+        """Return the method with its tolerance or its largest step size (s).
+
+        None is the communication step size.
+        """
         if self.method == "cvode":
             return {"method": "cvode", "tolerance": self.solver_tolerance(experiment)}
         step_size = self.solver_step_size(experiment)

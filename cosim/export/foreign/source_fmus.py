@@ -52,7 +52,7 @@ _ERROR_WORDS = ("error:", "Error:", "undefined reference", "multiple definition"
 
 @dataclass(frozen=True, slots=True)
 class _Configuration:
-    """One library: names of the files and folders below `sources/`, and definitions of the preprocessor."""
+    """One library: files and folders below `sources/`, and definitions of the preprocessor."""
 
     identifier: str
     files: Sequence[str]
@@ -61,7 +61,7 @@ class _Configuration:
 
 
 def compiled_fmu(file: FmuFile) -> Path:
-    """Return a copy of an FMU that also contains the binaries for this machine, compiled from its sources.
+    """Return a copy of an FMU with the binaries for this machine, compiled from its sources.
 
     Args:
         file: An FMU with sources.

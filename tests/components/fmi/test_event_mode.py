@@ -56,6 +56,12 @@ def bounce(path, isolation=None):
     return create_component(FmuFile(path), "bounce", isolation=isolation)
 
 
+def recorded_rows(columns, names):
+    """Return the rows of some columns as lists."""
+    found = [columns[name].tolist() for name in names]
+    return [list(row) for row in zip(*found, strict=True)]
+
+
 def own_results(points, per_point):
     """Return x, h, v and count at the communication points, and the number of events, without
     cosim.
@@ -79,13 +85,9 @@ def test_events_at_their_own_times_give_the_results_of_the_fmu_itself(bounces, f
     system = make_system({"bounce": bounce(bounces[flags], isolation)})
     columns = run_system(system, 1, "1/16", [*SIGNALS, "bounce.events"]).columns
     rows, events = own_results(16, 64)
-    assert [
-        list(row) for row in zip(*(columns[name].tolist() for name in SIGNALS), strict=True)
-    ] == rows
-    in_event_mode = {
-        "both": events,
-        "event mode": 4,
-    }  # without early return only those at the ends of steps
+    assert recorded_rows(columns, SIGNALS) == rows
+    # without early return only those at the ends of steps
+    in_event_mode = {"both": events, "event mode": 4}
     assert columns["bounce.events"][-1] == in_event_mode.get(flags, 0)
 
 
@@ -119,9 +121,7 @@ def test_an_fmu_that_refuses_what_it_declares_runs_without_it(bounces, flags, is
             make_system({"refusing": component}), 1, "1/16", [*signals, "refusing.events"]
         ).columns
     rows, _ = own_results(16, 64)
-    assert [
-        list(row) for row in zip(*(columns[name].tolist() for name in signals), strict=True)
-    ] == rows
+    assert recorded_rows(columns, signals) == rows
     assert columns["refusing.events"][-1] == 0
     assert caplog.text.count("could only be instantiated without them") == 1
 
@@ -137,9 +137,7 @@ def test_an_early_return_that_is_not_declared_is_continued_after_its_event(
             make_system({"undeclared": component}), 1, "1/16", [*signals, "undeclared.events"]
         ).columns
     rows, events = own_results(16, 64)
-    assert [
-        list(row) for row in zip(*(columns[name].tolist() for name in signals), strict=True)
-    ] == rows
+    assert recorded_rows(columns, signals) == rows
     assert columns["undeclared.events"][-1] == events
     assert caplog.text.count("without declaring mightReturnEarlyFromDoStep") == 1
 
@@ -177,10 +175,7 @@ def test_a_repeated_step_has_the_events_of_the_first_one(bounces, flags):
         make_system({"bounce": bounce(bounces[flags])}, stages=[(group,)]), 1, "1/16", SIGNALS
     )
     rows, _ = own_results(16, 64)
-    assert [
-        list(row)
-        for row in zip(*(repeated.columns[name].tolist() for name in SIGNALS), strict=True)
-    ] == rows
+    assert recorded_rows(repeated.columns, SIGNALS) == rows
 
 
 @pytest.mark.parametrize("isolation", [None, Isolation()], ids=["here", "isolated"])

@@ -229,7 +229,10 @@ class IsolatedFmu(FmuComponent):
     def prepare_step_calls(
         self, current_time: ctypes.c_double, step_size: float
     ) -> Sequence[PreparedCall]:
-        """Prepare one call that makes a whole step (set inputs, doStep, get outputs) in the worker process."""
+        """Prepare one call that makes a whole step in the worker process.
+
+        The step sets the inputs, calls doStep and gets the outputs.
+        """
         self._call_names = self._execute("prepare_step", step_size, convert=call_names)
         step = self._step_with_strings if self._has_strings else self._step
         return [PreparedCall(step, (current_time,), "step in the worker process")]
@@ -263,7 +266,7 @@ class IsolatedFmu(FmuComponent):
         return step_result(result), self._convert_strings(strings)
 
     def _store_early_return(self, result: StepResult) -> int:
-        """Store the result of a step for `interpret_status`, which the executor calls after the status discard."""
+        """Store the result for `interpret_status`, which the executor calls after discard."""
         self._result = result
         return DISCARD
 
@@ -288,7 +291,10 @@ class IsolatedFmu(FmuComponent):
         *arguments: Any,
         convert: Callable[[Any], Value] = no_value,  # type: ignore[assignment]
     ) -> Value:
-        """Execute a command in the worker process and return its value, converted by a function of `answers`."""
+        """Execute a command in the worker process.
+
+        Return its value, converted by a function of `messages`.
+        """
         self._command = command
         return self._parse_answer(self._request(encode_line([command, *arguments])), convert)
 

@@ -47,10 +47,11 @@ def decode_line(line: bytes) -> Any:
 
 
 class SpinningPoller:
-    """Poller that spins briefly before it sleeps, because sleeping and waking up take longer than most answers.
+    """Poller that spins briefly before it sleeps.
 
-    Spinning is unsuccessful if the other process computes longer or has no free processor. The next waits then sleep at once.
-    Their number doubles with each further unsuccessful spin.
+    Sleeping and waking up take longer than most answers. Spinning is unsuccessful if the other
+    process computes longer or has no free processor. The next waits then sleep at once. Their
+    number doubles with each further unsuccessful spin.
     """
 
     def __init__(self, descriptors: Iterable[int]):

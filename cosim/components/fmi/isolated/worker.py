@@ -207,7 +207,7 @@ class _LineSender(logging.Handler):
         self._writer, self._lock = writer, Lock()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Send a log message of the FMU, without the name of the component, which the importer adds."""
+        """Send a log message of the FMU; the importer adds the name of the component."""
         arguments = record.args if isinstance(record.args, tuple) else ()
         text = arguments[1] if len(arguments) == 2 else record.getMessage()
         self.send(encode_line({"log": (record.levelno, text)}))

@@ -254,7 +254,10 @@ def _run_worker(
 
 
 def _duplicate_above_limit(descriptor: int) -> int:
-    """Duplicate a descriptor to a number above the limit of open files, which code that closes all files does not reach."""
+    """Duplicate a descriptor to a number above the limit of open files.
+
+    Code that closes all files does not reach it.
+    """
     import fcntl
     import resource
 

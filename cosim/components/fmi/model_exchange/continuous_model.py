@@ -77,7 +77,9 @@ _FLOAT64 = np.dtype(np.float64)
 
 
 class LinearInputs:
-    """Inputs with the value start + slope * (time - begin) in a communication step that begins at `begin` (s).
+    """Inputs that change linearly within a communication step.
+
+    Their values are start + slope * (time - begin) in a step that begins at `begin` (s).
 
     Attributes:
         begin: Begin of the communication step (s).
@@ -89,7 +91,7 @@ class LinearInputs:
     """
 
     def __init__(self, ports: Ports, value_references: Mapping[str, int]):
-        """Find the inputs for which the ports contain slopes, which follow all other variables of type Float64."""
+        """Find the inputs with slopes, which follow all other variables of type Float64."""
         positions = {variable.name: part for variable, _, part in ports.elements()}
         inputs = [
             variable.derivative_of
@@ -135,13 +137,6 @@ class IntegrationError(Exception):
     def __init__(self, function: str, status: int | None, reason: str = ""):
         super().__init__(function, status, reason)
         self.function, self.status, self.reason = function, status, reason
-
-
-class StepCompletion(NamedTuple):
-    """Requests of fmi*CompletedIntegratorStep."""
-
-    event_needed: bool = False
-    terminate_requested: bool = False
 
 
 #: C type of a Boolean by FMI major version
@@ -198,14 +193,10 @@ class ContinuousModel:
         boolean = BOOLEAN[major]
         self._flags = (boolean(), boolean())
         addresses = [as_pointer(ctypes.addressof(flag)) for flag in self._flags]
-        no_set_state = (
-            () if major == 1 else ((ctypes.c_int if major == 2 else ctypes.c_bool).from_param(1),)
-        )
-        self._completion_arguments = (
-            self._instance,
-            *no_set_state,
-            *addresses[: 1 if major == 1 else 2],
-        )
+        # FMI 1.0 has neither the argument noSetFMUStatePriorToCurrentPoint nor a termination
+        self._completion_arguments = (self._instance, boolean.from_param(1), *addresses)
+        if major == 1:
+            self._completion_arguments = (self._instance, addresses[0])
 
     def is_called(self, role: str) -> bool:
         """Return whether the function of a role is needed.
@@ -252,20 +243,23 @@ class ContinuousModel:
             raise IntegrationError(self.functions["set_inputs"], status)
 
     def check_indicators(self, indicators: np.ndarray) -> None:
-        """Raise an IntegrationError if an event indicator is NaN, because its events would be missed."""
+        """Raise an IntegrationError if an event indicator is NaN: its events would be missed."""
         if np.isnan(indicators).any():
             number = int(np.flatnonzero(np.isnan(indicators))[0]) + 1
             raise IntegrationError(
                 self.functions["get_indicators"], None, f"event indicator {number} is NaN"
             )
 
-    def complete_step(self) -> StepCompletion:
-        """Call fmi*CompletedIntegratorStep if the FMU requires it."""
+    def complete_step(self) -> EventKind:
+        """Call fmi*CompletedIntegratorStep if the FMU requires it, and return its requests."""
+        kind = EventKind(0)
         if not self.needs_completed_step:
-            return StepCompletion()
+            return kind
         name = self.functions["complete_step"]
         status = self.library[name](*self._completion_arguments)
         if status not in SUCCESS_STATUSES:
             raise IntegrationError(name, status)
-        event, terminate = (flag.value not in (0, b"\0") for flag in self._flags)
-        return StepCompletion(event, terminate)
+        for flag, request in zip(self._flags, (EventKind.STEP, EventKind.TERMINATION), strict=True):
+            if flag.value not in (0, b"\0"):
+                kind |= request
+        return kind

@@ -35,6 +35,30 @@ _ROLES: Sequence[str] = (
     "complete_step",
     "set_inputs",
 )
+#: further members of the state, by their types and in their order in `_fixed_step.c`
+_SIZES = (
+    "version",
+    "stages",
+    "state_count",
+    "indicator_count",
+    "reference_count",
+    "input_count",
+)
+_ARRAYS = (
+    "states",
+    "derivatives",
+    "start_states",
+    "sum",
+    "indicators",
+    "previous_indicators",
+    "input_references",
+    "input_array",
+    "input_indices",
+    "input_slopes",
+    "input_values",
+)
+_TIMES = ("next_event_time", "substep_size", "time", "begin")
+_PROGRESS = ("substeps", "next_substep", "event", "status", "failed_function")
 #: relative to the substep: a time event so close after its end is reached
 _TIME_TOLERANCE = 1e-9
 #: status of a call that returned an event indicator which is NaN
@@ -44,50 +68,21 @@ _NOT_A_NUMBER = -1
 class FixedStepState(ctypes.Structure):
     """State of the integration, the same members as `State` in `_fixed_step.c`."""
 
-    _fields_ = (
-        [("instance", ctypes.c_void_p)]
-        + [(role, ctypes.c_void_p) for role in _ROLES]
-        + [
-            (name, ctypes.c_int64)
-            for name in (
-                "version",
-                "stages",
-                "state_count",
-                "indicator_count",
-                "reference_count",
-                "input_count",
-            )
-        ]
-        + [
-            (name, ctypes.c_void_p)
-            for name in (
-                *(
-                    "states",
-                    "derivatives",
-                    "start_states",
-                    "sum",
-                    "indicators",
-                    "previous_indicators",
-                ),
-                *(
-                    "input_references",
-                    "input_array",
-                    "input_indices",
-                    "input_slopes",
-                    "input_values",
-                ),
-            )
-        ]
-        + [(name, ctypes.c_double) for name in ("next_event_time", "substep_size", "time", "begin")]
-        + [
-            (name, ctypes.c_int64)
-            for name in ("substeps", "next_substep", "event", "status", "failed_function")
-        ]
-    )
+    _fields_ = [
+        ("instance", ctypes.c_void_p),
+        *((role, ctypes.c_void_p) for role in _ROLES),
+        *((name, ctypes.c_int64) for name in _SIZES),
+        *((name, ctypes.c_void_p) for name in _ARRAYS),
+        *((name, ctypes.c_double) for name in _TIMES),
+        *((name, ctypes.c_int64) for name in _PROGRESS),
+    ]
 
 
 class FixedStepIntegrator(Integrator):
-    """Integrator with fixed step size, in C if the extension was built, else in Python with the same results."""
+    """Integrator with fixed step size.
+
+    It is in C if the extension was built, else in Python with the same results.
+    """
 
     def __init__(self, model: ContinuousModel, method: Method, step_size: Fraction | None):
         """Prepare the integration.
@@ -181,7 +176,7 @@ class FixedStepIntegrator(Integrator):
                 state.event = state.status = 0
                 (self._euler_step if state.stages == 1 else self._runge_kutta_step)(begin, end)
                 state.time, state.next_substep = end, n + 1
-                state.event = self._find_state_event() | self._complete_step()
+                state.event = self._find_state_event() | model.complete_step()
                 if end >= state.next_event_time - _TIME_TOLERANCE * state.substep_size:
                     state.event |= EventKind.TIME
                 if state.event:
@@ -224,9 +219,3 @@ class FixedStepIntegrator(Integrator):
         crossed = (self._previous_indicators <= 0) != (self._model.indicators <= 0)
         self._previous_indicators[:] = self._model.indicators
         return EventKind.STATE if crossed.any() else EventKind(0)
-
-    def _complete_step(self) -> EventKind:
-        completion = self._model.complete_step()
-        return (EventKind.STEP if completion.event_needed else EventKind(0)) | (
-            EventKind.TERMINATION if completion.terminate_requested else EventKind(0)
-        )

@@ -13,7 +13,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from ctypes import CFUNCTYPE, POINTER, byref, c_char_p, c_double, c_int, c_int64, c_void_p
+from ctypes import CFUNCTYPE, byref, c_char_p, c_double, c_int, c_int64, c_void_p
 from typing import Any
 
 import numpy as np
@@ -62,7 +62,8 @@ class Cvode:
         self._time = c_double()
         self._free = ExitStack()
         self._load_libraries()
-        address = self._function("N_VGetArrayPointer_Serial", c_void_p, c_void_p)
+        address = self._cvode["N_VGetArrayPointer_Serial"]
+        address.restype, address.argtypes = c_void_p, [c_void_p]
         self._callbacks = (
             _RIGHT_HAND_SIDE(lambda time, x, dx, _: derivatives(time, address(x), address(dx))),
             _RIGHT_HAND_SIDE(lambda time, x, values, _: roots(time, address(x), values)),
@@ -79,66 +80,48 @@ class Cvode:
             ) from None
         self._core, self._cvode = sundials_core, sundials_cvode
 
-    def _function(self, name: str, result: Any, *arguments: Any) -> Any:
-        function: Any = (
-            self._core if name.startswith(("SUNContext", "SUNLogger")) else self._cvode
-        )[name]
-        function.restype, function.argtypes = result, arguments
-        return function
-
     def _create(self, root_count: int) -> None:
-        context, size = c_void_p(), len(self._states)
-        self._function("SUNContext_Create", c_int, c_int, POINTER(c_void_p))(0, byref(context))
-        self._free.callback(
-            self._function("SUNContext_Free", c_int, POINTER(c_void_p)), byref(context)
+        core, context, logger = self._core, c_void_p(), c_void_p()
+        core["SUNContext_Create"](0, byref(context))
+        self._free.callback(core["SUNContext_Free"], byref(context))
+        core["SUNContext_ClearErrHandlers"](context)
+        core["SUNContext_PushErrHandler"](context, self._callbacks[2], None)
+        core["SUNContext_GetLogger"](context, byref(logger))
+        core["SUNLogger_SetWarningFilename"](logger, os.devnull.encode())
+        size = c_int64(len(self._states))
+        self._x, self._tolerances = (
+            self._owned(
+                "N_VDestroy_Serial", "N_VMake_Serial", size, array.ctypes.data_as(c_void_p), context
+            )
+            for array in (self._states, self._absolute_tolerances)
         )
-        self._function("SUNContext_ClearErrHandlers", c_int, c_void_p)(context)
-        self._function("SUNContext_PushErrHandler", c_int, c_void_p, _ERROR_HANDLER, c_void_p)(
-            context, self._callbacks[2], None
-        )
-        logger = c_void_p()
-        self._function("SUNContext_GetLogger", c_int, c_void_p, POINTER(c_void_p))(
-            context, byref(logger)
-        )
-        self._function("SUNLogger_SetWarningFilename", c_int, c_void_p, c_char_p)(
-            logger, os.devnull.encode()
-        )
-        make_vector = self._function("N_VMake_Serial", c_void_p, c_int64, c_void_p, c_void_p)
-        self._x = self._owned(
-            make_vector(size, self._states.ctypes.data, context), "N_VDestroy_Serial"
-        )
-        self._tolerances = self._owned(
-            make_vector(size, self._absolute_tolerances.ctypes.data, context), "N_VDestroy_Serial"
-        )
-        make_matrix = self._function("SUNDenseMatrix", c_void_p, c_int64, c_int64, c_void_p)
-        matrix = self._owned(make_matrix(size, size, context), "SUNMatDestroy_Dense")
-        make_solver = self._function("SUNLinSol_Dense", c_void_p, c_void_p, c_void_p, c_void_p)
-        solver = self._owned(make_solver(self._x, matrix, context), "SUNLinSolFree_Dense")
-        self._memory = c_void_p(
-            self._function("CVodeCreate", c_void_p, c_int, c_void_p)(_BDF, context)
-        )
-        self._free.callback(
-            self._function("CVodeFree", None, POINTER(c_void_p)), byref(self._memory)
-        )
-        self._call(
-            "CVodeInit", (_RIGHT_HAND_SIDE, c_double, c_void_p), self._callbacks[0], 0.0, self._x
-        )
-        self._call("CVodeSVtolerances", (c_double, c_void_p), 1.0, self._tolerances)
-        self._call("CVodeRootInit", (c_int, _RIGHT_HAND_SIDE), root_count, self._callbacks[1])
-        self._call("CVodeSetNoInactiveRootWarn", ())
-        self._call("CVodeSetLinearSolver", (c_void_p, c_void_p), solver, matrix)
-        self._run = self._function(
-            "CVode", c_int, c_void_p, c_double, c_void_p, POINTER(c_double), c_int
-        )
-        self._set_stop_time = self._function("CVodeSetStopTime", c_int, c_void_p, c_double)
+        matrix = self._owned("SUNMatDestroy_Dense", "SUNDenseMatrix", size, size, context)
+        solver = self._owned("SUNLinSolFree_Dense", "SUNLinSol_Dense", self._x, matrix, context)
+        self._memory = self._pointer("CVodeCreate", _BDF, context)
+        self._free.callback(self._cvode["CVodeFree"], byref(self._memory))
+        self._call("CVodeInit", self._callbacks[0], c_double(0.0), self._x)
+        self._call("CVodeSVtolerances", c_double(1.0), self._tolerances)
+        self._call("CVodeRootInit", root_count, self._callbacks[1])
+        self._call("CVodeSetNoInactiveRootWarn")
+        self._call("CVodeSetLinearSolver", solver, matrix)
 
-    def _owned(self, address: int, destructor: str) -> int:
-        self._free.callback(self._function(destructor, None, c_void_p), address)
-        return address
+    def _pointer(self, function: str, *arguments: Any) -> c_void_p:
+        """Call a function that returns a pointer."""
+        create = self._cvode[function]
+        create.restype = c_void_p
+        return c_void_p(create(*arguments))
 
-    def _call(self, name: str, kinds: tuple[Any, ...], *arguments: Any) -> None:
-        if self._function(name, c_int, c_void_p, *kinds)(self._memory, *arguments) < 0:
+    def _owned(self, destructor: str, function: str, *arguments: Any) -> c_void_p:
+        """Call a function that creates an object, which `close` destroys."""
+        created = self._pointer(function, *arguments)
+        self._free.callback(self._cvode[destructor], created)
+        return created
+
+    def _call(self, function: str, *arguments: Any) -> int:
+        flag: int = self._cvode[function](self._memory, *arguments)
+        if flag < 0:
             raise SolverError(self._message)
+        return flag
 
     def _store_message(
         self, _line: int, _function: bytes, _file: bytes, text: bytes, *_: Any
@@ -154,8 +137,8 @@ class Cvode:
             absolute_tolerances: Absolute tolerances of the states, shape (n,).
         """
         self._absolute_tolerances[:] = absolute_tolerances
-        self._call("CVodeReInit", (c_double, c_void_p), time, self._x)
-        self._call("CVodeSVtolerances", (c_double, c_void_p), tolerance, self._tolerances)
+        self._call("CVodeReInit", c_double(time), self._x)
+        self._call("CVodeSVtolerances", c_double(tolerance), self._tolerances)
 
     def step(self, stop_time: float) -> tuple[int, float]:
         """Make one internal step, not beyond `stop_time` (s).
@@ -169,16 +152,20 @@ class Cvode:
             BaseException: An evaluation raised this exception, or a signal arrived during it.
         """
         self._message = ""
-        self._set_stop_time(self._memory, stop_time)
+        end = c_double(stop_time)
+        self._cvode["CVodeSetStopTime"](self._memory, end)
         with self._raising_exceptions_of_callbacks():
-            flag = self._run(self._memory, stop_time, self._x, byref(self._time), _ONE_STEP)
+            flag = self._cvode["CVode"](self._memory, end, self._x, byref(self._time), _ONE_STEP)
         if flag < 0:
             raise SolverError(self._message)
         return flag, self._time.value
 
     @contextmanager
     def _raising_exceptions_of_callbacks(self) -> Iterator[None]:
-        """Raise the first exception of a callback after the block, where ctypes would print it and continue."""
+        """Raise the first exception of a callback after the block.
+
+        ctypes would print it and continue.
+        """
         hook, exceptions = sys.unraisablehook, []
         sys.unraisablehook = lambda failure: exceptions.append(failure.exc_value)
         try:
@@ -233,7 +220,7 @@ class VariableStepIntegrator(Integrator):
         self._get_indicators = self._transfer("get_indicators")
 
     def _transfer(self, role: str) -> Callable[[int], None]:
-        """Return a function that calls the FMU's function of a role with the array at an address."""
+        """Return a function that transfers the array at an address by the function of a role."""
         model = self._model
         if not model.is_called(role):
             return lambda _: None
@@ -343,9 +330,10 @@ class VariableStepIntegrator(Integrator):
         return OK
 
     def _integrate_to(self, target: float) -> StepEvent:
-        """Make one step of the solver up to `target` (s) at most, and return its event, of kind 0 if there is none.
+        """Make one step of the solver, up to `target` (s) at most.
 
-        A `target` in the past is a time event that the FMU announces too late: it takes place at once.
+        Return its event, of kind 0 if there is none. A `target` in the past is a time event that
+        the FMU announces too late: it takes place at once.
         """
         kind = EventKind(0)
         if target - self._time > _MIN_ULPS * math.ulp(target):
@@ -357,15 +345,15 @@ class VariableStepIntegrator(Integrator):
                 )  # some FMUs return 0
                 self._cvode.restart(self._time, self._tolerance, self._tolerance * valid)
                 self._must_restart = False
-            kind = EventKind.STATE if self._step_of_solver(target) == ROOT_FOUND else kind
+            if self._step_of_solver(target) == ROOT_FOUND:
+                kind = EventKind.STATE
         else:
             self._time = max(self._time, target)
         self._model.set_time(self._time)
         self._model.set_states()
-        completion = self._model.complete_step()
-        kind |= EventKind.STEP if completion.event_needed else EventKind(0)
-        kind |= EventKind.TERMINATION if completion.terminate_requested else EventKind(0)
-        kind |= EventKind.TIME if self._time >= self._next_event_time else EventKind(0)
+        kind |= self._model.complete_step()
+        if self._time >= self._next_event_time:
+            kind |= EventKind.TIME
         return StepEvent(kind, self._time)
 
     def _step_of_solver(self, target: float) -> int:

@@ -96,7 +96,9 @@ class Examination:
 
 
 def examine(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> Examination:
-    """Check archive, model description and binary of an FMU, without extracting or executing anything.
+    """Check archive, model description and binary of an FMU.
+
+    Nothing is extracted or executed.
 
     Args:
         path: The FMU.

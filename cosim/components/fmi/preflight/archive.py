@@ -51,7 +51,7 @@ def check_member(entry: ZipEntry) -> Iterator[Finding]:
 
 
 def file_type_name(mode: int) -> str:
-    """Return words for the file type in a Unix file mode, for a message of the form "NAME is ..."."""
+    """Return words for the file type in a Unix file mode, for a message "NAME is ..."."""
     letter = stat.filemode(mode)[0]
     return _FILE_TYPE_NAMES.get(letter, f'of file type "{letter}"')
 
@@ -112,10 +112,13 @@ def _check_kind(entry: ZipEntry) -> Iterator[Finding]:
 
 
 def check_collisions(members: Sequence[tuple[str, object]]) -> Iterator[Finding]:
-    """Check for members that are the same file on some file system, or that are inside another member that is a file.
+    """Check for members that cannot exist beside each other on some file system.
+
+    They are the same file there, or one is inside another one that is a file.
 
     Args:
-        members: Names, each with CRC and size of the content; a member that is repeated without a change is a warning.
+        members: Names, each with CRC and size of the content; a member that is repeated without a
+            change is a warning.
     """
     first_names: dict[str, str] = {}
     contents: dict[str, object] = {}
@@ -221,7 +224,10 @@ class Archive:
             yield SIZE(text, entry.decoded_name)
 
     def _check_offsets(self) -> Iterator[Finding]:
-        """Check that members follow one another without overlaps and gaps, from the start to the central directory."""
+        """Check that members follow one another without overlaps and gaps.
+
+        They reach from the start of the file to the central directory.
+        """
         end = 0
         for entry in sorted(self._entries, key=lambda entry: entry.offset):
             try:

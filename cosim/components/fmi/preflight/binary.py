@@ -77,7 +77,9 @@ def check_binary(
     machine: FmuPlatform,
     limits: PreflightLimits,
 ) -> Iterator[Finding]:
-    """Check that the library for a platform exists, is complete, and exports the functions that the importer calls.
+    """Check the library for a platform.
+
+    It exists, is complete, and exports the functions that the importer calls.
 
     Args:
         archive: The FMU.

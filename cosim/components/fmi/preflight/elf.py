@@ -199,7 +199,10 @@ class _ElfReader:
     def _exported_symbols(
         self, dynamic: Mapping[int, int], strings: bytes
     ) -> Iterator[tuple[str, int]]:
-        """Yield names and addresses (0 in 32-bit files) of the symbols that are defined and visible to other libraries."""
+        """Yield names and addresses of the symbols that are defined and visible to others.
+
+        The addresses are 0 in 32-bit files.
+        """
         symbol = struct.Struct(self.byte_order + ("L2BHQ8x" if self.bits == 64 else "L8x2BH"))
         table = self._read_address(dynamic[_DT_SYMTAB], self._symbol_count(dynamic) * symbol.size)
         for st_name, st_info, st_other, st_shndx, *st_value in symbol.iter_unpack(table):

@@ -89,7 +89,10 @@ def raise_errors(path: Path, findings: Iterable[Finding]) -> None:
 
 
 def escape_unprintable(text: str, length: int = 300) -> str:
-    """Return text of an FMU as one line of at most `length` characters, with control characters escaped."""
+    """Return text of an FMU as one line without control characters.
+
+    The line has at most `length` characters.
+    """
     escaped = escape_control_characters(text[: length + 1])
     return escaped if len(escaped) <= length else escaped[: length - 3] + "..."
 

@@ -149,7 +149,7 @@ def _check_segment(content: bytes, command: int) -> None:
 def _symbol_table_exports(
     content: bytes, symoff: int, nsyms: int, stroff: int, strsize: int
 ) -> Iterator[str]:
-    """Yield the names of the defined external symbols, without the leading underscore of C names."""
+    """Yield the names of the defined external symbols without their leading underscores."""
     if nsyms > _MAX_ENTRIES or stroff + strsize > len(content):
         raise InvalidLibraryError(
             f"is truncated: its table of {nsyms} symbols ends at byte {stroff + strsize}, the file "

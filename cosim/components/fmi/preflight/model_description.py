@@ -134,7 +134,7 @@ class ModelVariable:
 
     @property
     def initial(self) -> str:
-        """Value of `initial`, or the default for causality and variability, or "" if there is no default."""
+        """Value of `initial`, or its default, or "" if there is none."""
         allowed = ALLOWED_INITIAL.get((self.causality, self.variability), ("",))
         return self.attributes.get("initial") or allowed[0]
 

@@ -63,13 +63,8 @@ def check_names(model: ModelDescription) -> Iterator[Finding]:
     if not model.interfaces:
         yield INTERFACE("offers neither Co-Simulation nor Model Exchange", DESCRIPTION_FILE, line)
     for name, attributes in model.interfaces.items():
-        line = model.lines[
-            ""
-            if model.major == 1
-            else "CoSimulation"
-            if name == "co-simulation"
-            else "ModelExchange"
-        ]
+        element = "CoSimulation" if name == "co-simulation" else "ModelExchange"
+        line = model.lines["" if model.major == 1 else element]
         identifier = attributes.get("modelIdentifier", "")
         if not identifier or not {"/", "\\"}.isdisjoint(identifier):
             yield LIBRARY_NAME(
@@ -86,7 +81,7 @@ def check_names(model: ModelDescription) -> Iterator[Finding]:
 
 
 def check_units(model: ModelDescription) -> Iterator[Finding]:
-    """Check that unit names are unique, and that base units have valid exponents, factors and offsets."""
+    """Check that unit names are unique, and the numbers of base units are valid."""
     for name, line in _find_duplicates((unit.name, unit.line) for unit in model.units):
         yield UNIT_NAME(f'the unit "{name}" is defined twice', DESCRIPTION_FILE, line)
     for unit in model.units:
@@ -116,7 +111,7 @@ def _is_valid_base_unit_value(name: str, text: str) -> bool:
 
 
 def check_types(model: ModelDescription) -> Iterator[Finding]:
-    """Check that type names are unique, that types are defined by FMI, and that enumerations have valid items."""
+    """Check that types have unique names, are defined by FMI, and have valid items."""
     for name, line in _find_duplicates(
         (definition.name, definition.line) for definition in model.types
     ):
@@ -154,7 +149,7 @@ def _item_violations(definition: TypeDefinition) -> Iterator[str]:
 
 
 def check_counts(model: ModelDescription) -> Iterator[Finding]:
-    """Check the numbers of states and event indicators that FMI 1.0 and 2.0 declare for Model Exchange."""
+    """Check the numbers of states and event indicators of FMI 1.0 and 2.0."""
     if "model-exchange" not in model.interfaces or model.major == 3:
         return
     for name in ("numberOfContinuousStates", "numberOfEventIndicators"):
@@ -167,7 +162,7 @@ def check_counts(model: ModelDescription) -> Iterator[Finding]:
 
 
 def check_experiment(model: ModelDescription) -> Iterator[Finding]:
-    """Check that the values of the default experiment are finite, and that stop time, step size and tolerance are consistent."""
+    """Check that the values of the default experiment are finite and consistent."""
     line = model.lines.get("DefaultExperiment", 0)
     numbers: dict[str, float] = {}
     for name in ("startTime", "stopTime", "stepSize", "tolerance"):
@@ -229,7 +224,10 @@ _VALID_KINDS = ("dependent", "constant", "fixed", "tunable", "discrete")
 
 
 def check_references(model: ModelDescription) -> Iterator[Finding]:
-    """Check that elements refer to existing variables, occur once, and have one dependency kind for each dependency."""
+    """Check the references of the model structure.
+
+    Elements refer to existing variables, occur once, and have one kind for each dependency.
+    """
     seen: set[tuple[str, str]] = set()
     for unknown in model.model_structure:
         for reference in (unknown.reference.strip(), *(unknown.dependencies or ())):
@@ -295,7 +293,10 @@ def _variables_in(model: ModelDescription, element: str) -> list[ModelVariable]:
 def _initial_unknowns(
     model: ModelDescription, derivatives: list[ModelVariable]
 ) -> list[ModelVariable]:
-    """Return the outputs, calculated parameters, states and state derivatives that are computed in initialization mode."""
+    """Return the variables that are computed in initialization mode.
+
+    These are outputs, calculated parameters, states and state derivatives.
+    """
     states = [
         model.by_reference.get(variable.attributes.get("derivative", "").strip())
         for variable in derivatives

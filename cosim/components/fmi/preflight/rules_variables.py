@@ -391,7 +391,7 @@ def _check_enumeration_start(variable: ModelVariable) -> Iterator[Finding]:
 
 
 def check_dimensions(model: ModelDescription, limits: PreflightLimits) -> Iterator[Finding]:
-    """Check the dimensions of arrays, the number of their start values, and the number of all elements."""
+    """Check dimensions and numbers of start values of arrays, and the number of all elements."""
     scalars = 0
     for variable in model.variables:
         if not variable.dimensions:

@@ -213,7 +213,7 @@ def _damaged_directory_error(position: int) -> FatalFindingError:
 
 
 def _apply_zip64(extra: bytes, *values: int) -> tuple[int, ...]:
-    """Replace the values that did not fit into 32 bits by those of the ZIP64 extra field (APPNOTE 4.5.3)."""
+    """Replace values above 32 bits by those of the ZIP64 extra field (APPNOTE 4.5.3)."""
     position = 0
     while _ZIP64_MARKER in values and position + 4 <= len(extra):
         header_id, length = struct.unpack_from("<2H", extra, position)

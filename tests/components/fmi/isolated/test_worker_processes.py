@@ -258,7 +258,8 @@ def killed(n, count):
     print(Path(f"/proc/self/task/{os.getpid()}/children").read_text(), flush=True)
     os.kill(os.getpid(), 9)
 fmu = create_component(FmuFile(Path(sys.argv[2])), "a", isolation=Isolation())
-simulate(make_system({"a": fmu}), Settings(exact_fraction(0), exact_fraction(1), exact_fraction("1/100")), [killed])
+settings = Settings(exact_fraction(0), exact_fraction(1), exact_fraction("1/100"))
+simulate(make_system({"a": fmu}), settings, [killed])
 """
 
 

@@ -131,7 +131,7 @@ def _load_fmu(path: Path) -> None:
 
 
 def refusal_message(path: Path) -> str:
-    """Return the message of the InputError when the FMU is loaded; every line of it names the file."""
+    """Return the message of the InputError when the FMU is loaded; each line names the file."""
     with pytest.raises(InputError) as error:
         _load_fmu(path)
     lines = str(error.value).splitlines()

@@ -263,7 +263,8 @@ def test_a_wrong_version_or_platform_is_a_warning(case, good, tmp_path):
 @pytest.mark.parametrize("option", ["-O0", "-O1", "-O3", "-Os", "-fcf-protection=none"])
 def test_texts_are_read_from_functions_that_only_return_them(tmp_path, option):
     source = """const char *fmi2GetVersion(void) { return "2.0"; } char text[] = "later";
-    const char *fmi3GetVersion(void) { text[0] = 'L'; return text; } int other(void) { return 1; }"""
+    const char *fmi3GetVersion(void) { text[0] = 'L'; return text; }
+    int other(void) { return 1; }"""
     library = elf.read_library(compiled(tmp_path, "texts", source, option).read_bytes(), "x86_64")
     assert library.constant_texts == {"fmi2GetVersion": b"2.0"}
 

@@ -74,12 +74,15 @@ FMI3 = """<?xml version="1.0"?>
 <fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="t">
   <CoSimulation modelIdentifier="m" canBeInstantiatedOnlyOncePerProcess="true"/>
   <UnitDefinitions>
-    <Unit name="km/h"><BaseUnit m="1" s="-1" factor="0.2777777777777778"/></Unit><Unit name="deg"/><Unit name="bar(g)"/>
+    <Unit name="km/h"><BaseUnit m="1" s="-1" factor="0.2777777777777778"/></Unit>
+    <Unit name="deg"/><Unit name="bar(g)"/>
   </UnitDefinitions>
   <TypeDefinitions>
     <Float64Type name="Speed" unit="km/h" min="0" max="300" description="a speed"/>
     <Float64Type name="Angle" unit="deg" relativeQuantity="true"/>
-    <EnumerationType name="Mode"><Item name="off" value="-1"/><Item name="on" value="4"/></EnumerationType>
+    <EnumerationType name="Mode">
+      <Item name="off" value="-1"/><Item name="on" value="4"/>
+    </EnumerationType>
   </TypeDefinitions>
   <DefaultExperiment startTime="1" stopTime=" 2.5 "/>
   <ModelVariables>
@@ -96,7 +99,8 @@ FMI3 = """<?xml version="1.0"?>
     <Float64 name="turn" valueReference="7" declaredType="Angle"/>
     <Float64 name="gauge" valueReference="8" unit="bar(g)"/>
     <Float64 name="flow" valueReference="10" unit="m³/s"/>
-    <Enumeration name="mode" valueReference="9" declaredType="Mode" causality="parameter" start="4"/>
+    <Enumeration name="mode" valueReference="9" declaredType="Mode" causality="parameter"
+      start="4"/>
     <Int8 name="i" valueReference="6" causality="input" clocks="5" start="-128"/>
   </ModelVariables>
   <ModelStructure/>

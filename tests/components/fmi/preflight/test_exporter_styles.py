@@ -31,8 +31,8 @@ def description(
     structure="<ModelStructure/>",
 ):
     head = HEAD.format(encoding=encoding, root=root) + INTERFACE.format(more=more)
-    text = f"{head}{before}<ModelVariables>{''.join(variables)}</ModelVariables>{structure}</fmiModelDescription>"
-    return text.encode(encoding)
+    listed = f"<ModelVariables>{''.join(variables)}</ModelVariables>"
+    return f"{head}{before}{listed}{structure}</fmiModelDescription>".encode(encoding)
 
 
 DESCRIPTIONS = {
