@@ -9,12 +9,12 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any, TypeVar
 
 from cosim.core.errors import InputError, Problem, did_you_mean
 
 from .vehicles.common.vehicle_reader import read_visual
+from .vehicles.data import FOLDER
 from .vehicles.model import Model
 
 _Value = TypeVar("_Value")
@@ -27,9 +27,7 @@ NAMED_LISTS = ("rotors", "thrusters", "propellers")
 COMMON_KEYS = ("family", "name", "description", "sources", "validity", "visual", "$schema")
 
 #: vehicles that are given by a file, whose name is that of the vehicle
-_FILES = {
-    file.stem: file for file in sorted((Path(__file__).parent / "vehicles/data").glob("*.json"))
-}
+_FILES = {file.stem: file for file in sorted(FOLDER.glob("*.json"))}
 
 # Builders import the modules of their vehicles themselves: a run needs few of them.
 
@@ -157,7 +155,7 @@ def model_from_data(data: Mapping[str, Any], name: str = "") -> Model:
 
 
 def _named_links(data: Mapping[str, Any]) -> Iterator[Problem]:
-    """Yield a problem for each rotor, thruster or propeller whose place is a link of a URDF file."""
+    """Yield a problem for each rotor, thruster or propeller that is placed by a link of a URDF."""
     for key in NAMED_LISTS:
         for i, element in enumerate(found if isinstance(found := data.get(key), list) else []):
             if isinstance(element, Mapping) and "link" in element:
