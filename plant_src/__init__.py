@@ -1,1 +1,1 @@
-"""Plant models: vehicles with equations of motion and geometry, and the PyBullet world with contact between them."""
+"""Plant models: vehicles with their equations, and a world with contact between them."""

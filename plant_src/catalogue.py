@@ -155,7 +155,7 @@ def model_from_data(data: Mapping[str, Any], name: str = "") -> Model:
 
 
 def _named_links(data: Mapping[str, Any]) -> Iterator[Problem]:
-    """Yield a problem for each rotor, thruster or propeller that is placed by a link of a URDF."""
+    """Yield a problem for each actuator whose place is a link of a URDF file."""
     for key in NAMED_LISTS:
         for i, element in enumerate(found if isinstance(found := data.get(key), list) else []):
             if isinstance(element, Mapping) and "link" in element:

@@ -49,7 +49,10 @@ MIN_PANEL_HEIGHT, MAX_PANEL_HEIGHT = 1.0, 6.0  # in, axes with equal scales
 
 
 def fit_height(figure: Figure, axes: Axes) -> None:
-    """Set equal scales, and the height of a figure with constrained layout at which the axes fill its width."""
+    """Set equal scales, and the height of a figure at which the axes fill its width.
+
+    The figure has a constrained layout.
+    """
     axes.margins(0.05)
     (x_first, x_last), (y_first, y_last) = axes.get_xlim(), axes.get_ylim()
     ratio = (y_last - y_first) / (x_last - x_first)

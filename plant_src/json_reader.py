@@ -39,7 +39,10 @@ class JsonReader:
             self.problems.append(problem)
 
     def add_missing(self, path: JsonPath, key: str, common: str) -> None:
-        """Record that a key is missing at `path` and at `common`, whose values count for all, unless it is misspelt there."""
+        """Record that a key is missing at `path` and at `common`, unless it is misspelt there.
+
+        The values at `common` count for all.
+        """
         places = (("arguments", *path), ("arguments", common))
         misspelt = (
             each for each in self.problems if each.message.endswith(f'; did you mean "{key}"?')

@@ -38,7 +38,10 @@ def touchdown_row(result: Result, vehicle: str) -> int | None:
 
 
 def horizontal_distance(result: Result, first: str, second: str) -> np.ndarray:
-    """Return the distance in the x-y plane of the world between two signal prefixes with a `position` (m), shape (rows,)."""
+    """Return the horizontal distance (m) between two signal prefixes, shape (rows,).
+
+    Both have a `position` (m).
+    """
     x, y = (
         result[f"{first}.position.{axis}"] - result[f"{second}.position.{axis}"] for axis in "xy"
     )
@@ -47,7 +50,10 @@ def horizontal_distance(result: Result, first: str, second: str) -> np.ndarray:
 
 
 def distance_from_line(position: np.ndarray, start: complex, end: complex) -> np.ndarray:
-    """Return the distance (m) of positions x + iy from the line through two points, or from the point if they coincide."""
+    """Return the distance (m) of positions x + iy from the line through two points.
+
+    If the points coincide, it is the distance from them.
+    """
     direction = end - start
     distance: np.ndarray = (
         np.abs(((position - start) * np.conj(direction)).imag) / abs(direction)
@@ -72,7 +78,7 @@ def used_waypoints(
 
 
 def rotation_matrix(result: Result, vehicle: str) -> np.ndarray:
-    """Return the rotation matrices Rz(yaw) Ry(pitch) Rx(roll) from body axes to world axes, shape (rows, 3, 3)."""
+    """Return the rotations Rz(yaw) Ry(pitch) Rx(roll), body to world, shape (rows, 3, 3)."""
     roll, pitch, yaw = (result[f"{vehicle}.attitude.{angle}"] for angle in ("roll", "pitch", "yaw"))
     (cr, sr), (cp, sp), (cy, sy) = ((np.cos(angle), np.sin(angle)) for angle in (roll, pitch, yaw))
     matrix = [
@@ -84,12 +90,18 @@ def rotation_matrix(result: Result, vehicle: str) -> np.ndarray:
 
 
 def relative_position(result: Result, vehicle: str, deck: str) -> np.ndarray:
-    """Return the position of a vehicle's centre of mass relative to the deck centre (m), in deck axes, shape (rows, 3)."""
+    """Return the position of a vehicle relative to the deck (m, deck axes), shape (rows, 3).
+
+    It is that of the centre of mass from the centre of the deck.
+    """
     return _to_deck_axes(result, deck, _world_offset(result, vehicle, deck))
 
 
 def relative_velocity(result: Result, vehicle: str, deck: str) -> np.ndarray:
-    """Return the velocity of a vehicle relative to the point of the deck below it (m/s), in deck axes, shape (rows, 3)."""
+    """Return the velocity of a vehicle relative to the deck (m/s, deck axes), shape (rows, 3).
+
+    It is relative to the point of the deck below the vehicle.
+    """
     vessel = deck.removesuffix(".deck")
     rates_body = np.stack([result[f"{vessel}.rates.{axis}"] for axis in "pqr"], axis=1)
     rates = np.einsum("nij,nj->ni", rotation_matrix(result, vessel), rates_body)

@@ -38,6 +38,6 @@ def views_in_parts(
 
 
 def recorded_others(outputs: Ports) -> list[tuple[str, np.ndarray]]:
-    """Return the name of each recorded variable that is no output, and the view to which its value belongs."""
+    """Return name and view of each recorded variable that is no output."""
     views = variable_views(outputs.variables, outputs.arrays)
     return [(variable.name, view) for variable, view in views if variable.causality != "output"]

@@ -54,7 +54,10 @@ _FIXED = {
 
 
 def vehicle_constants(body: ContactBody, pointer: str) -> Iterator[tuple[Variable, np.ndarray]]:
-    """Yield the parameters of a vehicle, except those of initial state and waves, as constants that `pointer` sets."""
+    """Yield the parameters of a vehicle as constants that `pointer` sets.
+
+    Those of initial state and waves are left out.
+    """
     for variable, values in variable_views(
         body.model.real_variables("parameter"), {DTYPES["Float64"]: body.parameters}
     ):
@@ -74,7 +77,7 @@ def vehicle_constants(body: ContactBody, pointer: str) -> Iterator[tuple[Variabl
 
 
 def input_limits(body: ContactBody) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Yield the name of each limited scalar input of a vehicle, and its lower and upper limit in the unit of the input.
+    """Yield name and limits of each limited scalar input of a vehicle, in its unit.
 
     Inputs without an actuator, such as the angle of a fixed rudder, are left out.
     """
@@ -173,7 +176,7 @@ class World(Component):
 
     @classmethod
     def warm(cls, **arguments: Any) -> None:
-        """Construct a world, so that forked processes inherit what it loads, and preconnect a Bullet client.
+        """Construct a world and preconnect a Bullet client, which forked processes inherit.
 
         The equations of all vehicle models are unpacked too, because a run may have other vehicles.
         """
@@ -217,9 +220,9 @@ class World(Component):
         self._check_overlaps(
             fixed.paths | {body.body_id: f"vehicles.{body.name}" for body in self._fleet.bodies}
         )
-        self.input_limits = {
-            name: limits for body in self._fleet.bodies for name, limits in input_limits(body)
-        }
+        self.input_limits = {}
+        for body in self._fleet.bodies:
+            self.input_limits |= dict(input_limits(body))
         self._environment = EnvironmentModel(
             settings.environment,
             settings.sea,
@@ -228,9 +231,9 @@ class World(Component):
             self._fleet.bodies,
         )
         self._has_environment = bool(self._environment.update_functions)
-        self.warnings = [
-            warning for vehicle in settings.vehicles for warning in placement_warnings(vehicle)
-        ]
+        self.warnings = []
+        for vehicle in settings.vehicles:
+            self.warnings += placement_warnings(vehicle)
         for name in self._environment.vessels_without_wave_motion:
             component_log.log_message(
                 self._name,
@@ -305,7 +308,9 @@ class World(Component):
         bound_inputs, bound_outputs = inputs.arrays[_FLOAT].data, outputs.arrays[_FLOAT].data
         # memoryviews: copying a few numbers is faster than with NumPy
         own_outputs = self._fleet.outputs.data
-        parts = [part for body in self._fleet.bodies for part in body.inputs]
+        parts: list[np.ndarray] = []
+        for body in self._fleet.bodies:
+            parts += body.inputs
         ends = list(accumulate(map(len, parts)))
         self._input_copies = [
             (part.data, bound_inputs[end - len(part) : end])
@@ -357,7 +362,10 @@ class World(Component):
         self._environment.publish(0.0)
 
     def do_step(self, time: float, step_size: float) -> None:
-        """Advance from `time` (s) by `step_size` (s), in equal Bullet steps of at most MAX_BULLET_STEP."""
+        """Advance from `time` (s) by `step_size` (s), in equal Bullet steps.
+
+        Each is at most MAX_BULLET_STEP.
+        """
         if step_size != self._step_size:
             self._set_step_size(time, step_size)
         if self._contacts.has_contacts:

@@ -133,7 +133,7 @@ class _WorldSettingsReader(JsonReader):
         )
 
     def read_hull(self, model: Model, spec: Mapping[str, Any], path: JsonPath) -> dict[str, float]:
-        """Return the parameters of the hull with the name "hull", none if the vehicle has its default one."""
+        """Return the parameters of the hull named by "hull"; none for the default hull."""
         if "hull" not in spec:
             return {}
         if not model.hulls:
@@ -184,7 +184,7 @@ class _WorldSettingsReader(JsonReader):
         return model.body
 
     def find_model(self, spec: Mapping[str, Any], path: JsonPath) -> Model | None:
-        """Return the model with the name or data and the motion of `spec`, or None if there is none."""
+        """Return the model with the name or data and the motion of `spec`, or None."""
         if "model" not in spec:
             return None
         try:

@@ -175,7 +175,7 @@ def imported_packages(path):
 def test_only_the_build_names_files_of_the_plant():
     named = [path for path in sources("cosim") if "plant_src" in path.read_text()]
     assert {module_name(path) for path in named} <= {
-        "cosim.export.sources",
+        "cosim.export.fmu_sources",
         "cosim.export.plant",
     }
 

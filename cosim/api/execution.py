@@ -12,7 +12,7 @@ from ..core.errors import CosimError, InputError, Problem
 from ..engine import Termination
 from ..engine.plan_run import SimulationOutcome
 from ..process.float_mode import default_float_mode
-from ..results import Kpis, Result
+from ..results import Kpis, Result, RunMetadata
 from ..results.checks import (
     CheckOutcome,
     Number,
@@ -51,7 +51,7 @@ def evaluate_outcome(prepared: PreparedRun, outcome: SimulationOutcome, complete
     """
     timing = {**prepared.timing, **outcome.timing}
     timing["simulate_seconds"] = sum(outcome.timing.values())
-    metadata = {**prepared.metadata, **_outcome_metadata(prepared, outcome)}
+    metadata: RunMetadata = {**prepared.metadata, **_outcome_metadata(prepared, outcome)}
     if complete or outcome.failure:
         warn_exceeded_limits(prepared, outcome.recording)
     result = Result(outcome.recording, timing=timing, metadata=metadata, failure=outcome.failure)
@@ -74,7 +74,7 @@ def _evaluate_run(result: Result, prepared: PreparedRun) -> Result:
     )
     checks = evaluate_all_checks(kpis, prepared.checks)
     failed = [check.check["kpi"] for check in checks if not check.passed]
-    about = {
+    about: RunMetadata = {
         "kpi_units": kpi_units(functions, kpis, result.units),
         "kpi_senses": kpi_senses(functions, kpis),
         "kpi_notes": kpi_notes(values, _signals_of_optional_kpis(prepared, functions, result)),
@@ -141,20 +141,21 @@ def _adding_location(prepared: PreparedRun, *path: str | int) -> Iterator[None]:
         ) from error
 
 
-def _outcome_metadata(prepared: PreparedRun, outcome: SimulationOutcome) -> dict[str, Any]:
+def _outcome_metadata(prepared: PreparedRun, outcome: SimulationOutcome) -> RunMetadata:
     """Return the metadata that is known after the run.
 
     Steps, timing, signals that are not finite, termination, failure.
     """
     failure = outcome.failure
-    text = str(failure) or type(failure).__name__
+    interrupted = isinstance(failure, KeyboardInterrupt)
+    text = "interrupted" if interrupted else str(failure) or type(failure).__name__
     allows_all = prepared.spec.non_finite == "allow"
     return {
         "macro_steps": outcome.macro_steps,
         "real_time": outcome.real_time,
         "non_finite": {} if allows_all else warn_non_finite(outcome.recording),
         "terminated_by": outcome.termination and _describe_termination(outcome.termination),
-        "failure": failure and ("interrupted" if isinstance(failure, KeyboardInterrupt) else text),
+        "failure": text if failure else None,
     }
 
 

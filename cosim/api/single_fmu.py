@@ -32,7 +32,7 @@ from ..engine.settings import Settings
 from ..export.foreign import add_binary
 from ..process.float_mode import default_float_mode
 from ..process.process_state import exclusive_process_state
-from ..results import Result
+from ..results import Result, RunMetadata
 from ..results.checks import warn_non_finite
 from ..results.csv_files import read_rows
 from ..scenario.name_resolution import UnknownNameError, check_assignment
@@ -108,7 +108,7 @@ def simulate(
     result = None
     try:
         with simulating(plan) as run:
-            about = {
+            about: RunMetadata = {
                 "name": Path(fmu).stem,
                 "non_finite": warn_non_finite(run.recording),
                 "macro_steps": run.macro_steps,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import click
 
@@ -178,14 +178,14 @@ def save_after_crash(outcome: SupervisedOutcome, options: RunOptions) -> None:
     The report is written by another supervised process, because it calls functions of the user.
     """
     from ..process.run_files import read_metadata
-    from ..results import Result
+    from ..results import Result, RunMetadata
     from ..results.checks import warn_non_finite
 
     folder = outcome.journal.folder
     if folder is not None:
         failure = "interrupted" if outcome.interrupted else str(outcome.failure)
-        metadata = {
-            **read_metadata(folder),
+        metadata: RunMetadata = {
+            **cast("RunMetadata", read_metadata(folder)),
             "macro_steps": outcome.journal[STEP_COUNT],
             "failure": failure,
         }

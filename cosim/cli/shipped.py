@@ -50,7 +50,7 @@ def _list_documents(pattern: str) -> Iterator[Entry]:
 
 def _list_models() -> Iterator[Entry]:
     """Yield the vehicle files, and the equations whose folders have a README file."""
-    from ..export.sources import find_sources
+    from ..export.fmu_sources import find_sources
 
     for source in find_sources(resources.root()):
         readme = source.path.parent / "README.md"
@@ -72,7 +72,7 @@ def shipped_fmus() -> dict[str, Path]:
 def _list_controllers() -> Iterator[Entry]:
     """Yield the FMUs that are exported from `controllers/`, with the descriptions in them."""
     from ..components.fmi import FmuFile
-    from ..export.sources import find_sources
+    from ..export.fmu_sources import find_sources
 
     folder, files = resources.root() / "controllers", shipped_fmus()
     names = {

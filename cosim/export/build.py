@@ -13,8 +13,7 @@ from ..core.errors import InputError, Problem, did_you_mean
 from ..core.json_values import parse_object
 from ..results.files import write_file
 from .cache import cached_file, file_hash
-from .foreign.python_class import write_python_fmu
-from .sources import (
+from .fmu_sources import (
     SOURCE_KINDS,
     Source,
     classify_source,
@@ -23,6 +22,7 @@ from .sources import (
     resolve_source_path,
     tool_versions,
 )
+from .foreign.pythonfmu_export import write_python_fmu
 
 #: FMI version -> folder of the FMUs
 FMU_FOLDERS = {2: Path("fmus"), 3: Path("fmus/fmi3")}

@@ -20,7 +20,7 @@ from ..core.component_log import discard_messages
 from ..core.errors import ComponentError, CosimError, Problem
 from .build import fmu_files, read_manifest
 from .cache import file_hash
-from .sources import Source, export_source, find_sources
+from .fmu_sources import Source, export_source, find_sources
 
 
 def check_fmus(root: Path) -> list[Problem]:

@@ -157,7 +157,8 @@ def find_failure(result: Result, outcomes: Sequence[CheckOutcome]) -> Failure | 
     if result.metadata.get("failure"):
         time, label = float(result.time[-1]), "failure"
     elif result.crashed:
-        time, label = float(result.metadata["terminated_by"]["since"]), "crash"
+        ended = result.metadata["terminated_by"] or {}
+        time, label = float(ended["since"]), "crash"
     elif failed:
         name = failed[0].check["kpi"]
         time, label = _kpi_time(result, name.partition(".")[0]), f"check of {name} failed"

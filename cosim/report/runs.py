@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 from pydantic import (
     BaseModel,
@@ -20,7 +20,7 @@ from pydantic import (
 
 from ..core.errors import InputError
 from ..core.json_values import is_number, parse_object
-from ..results import Kpis, Result
+from ..results import Kpis, Result, RunMetadata
 from ..scenario.json_document import read_document
 from ..scenario.named_functions import load_function
 from ..scenario.validation import schema_problems
@@ -160,7 +160,10 @@ def read_run(directory: str | Path) -> Result:
     numbers = {name: math.nan if value is None else value for name, value in kpis.items()}
     recording = Result.from_csv(directory / "result.csv").recording
     return Result(
-        replace(recording, units={**recording.units, **units}), Kpis(numbers), timing, about
+        replace(recording, units={**recording.units, **units}),
+        Kpis(numbers),
+        timing,
+        cast(RunMetadata, about),
     )
 
 

@@ -1,5 +1,5 @@
 """Results of a run: signals, KPIs, checks, their files, and comparison with a reference."""
 
-from .result import KpiError, Kpis, Result, SignalError, write_run
+from .result import KpiError, Kpis, Result, RunMetadata, SignalError, write_run
 
-__all__ = ["KpiError", "Kpis", "Result", "SignalError", "write_run"]
+__all__ = ["KpiError", "Kpis", "Result", "RunMetadata", "SignalError", "write_run"]

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypedDict
 
 import numpy as np
 
@@ -61,6 +61,56 @@ class Presentation:
     write_report: ClassVar[Callable[[Path], None]]
 
 
+class RunMetadata(TypedDict, total=False):
+    """Description of a run, as in run.json: how it was made and how it ended.
+
+    A result that was read from a file has only the keys of the file.
+
+    Attributes:
+        name: Name of the scenario.
+        scenario: Expanded scenario.
+        scenario_file: Absolute path of its file.
+        parameters: Values of variables that the caller has set, by JSON pointer.
+        system: Components, connections and stages (see `cosim.scenario.overview`).
+        versions: Versions of cosim and of packages that influence results.
+        machine: Operating system and processor.
+        sha256: Hashes of all files by name.
+        macro_steps: Number of completed macro steps.
+        terminated_by: Arguments of `describe_termination`; None: the run reached its stop time.
+        failure: Error that ended the run early; None for none.
+        non_finite: Time (s) of the first NaN or infinity of each signal.
+        real_time: Statistics of the lateness; None for a run without pacing.
+        kpi_units: Unit of each KPI.
+        kpi_senses: "lower" or "higher" for each KPI that is better so.
+        kpi_notes: Reasons of missing KPIs, and signals that optional KPIs took.
+        check_notes: Reasons of missing KPIs with a check.
+        warnings: Messages of the run.
+        live_events: Events that a live view has set.
+        deviation: Deviation from the reference.
+    """
+
+    name: str
+    scenario: dict[str, Any]
+    scenario_file: str
+    parameters: dict[str, Any]
+    system: dict[str, Any]
+    versions: dict[str, str]
+    machine: dict[str, str]
+    sha256: dict[str, str]
+    macro_steps: int
+    terminated_by: dict[str, Any] | None
+    failure: str | None
+    non_finite: dict[str, float]
+    real_time: Mapping[str, Any] | None
+    kpi_units: dict[str, str]
+    kpi_senses: dict[str, str]
+    kpi_notes: Sequence[str]
+    check_notes: Sequence[str]
+    warnings: Sequence[str]
+    live_events: Sequence[Any]
+    deviation: Any
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """Recorded run: a read-only mapping from names of signals to their values.
@@ -81,7 +131,7 @@ class Result:
     recording: Recording
     kpis: Mapping[str, float | int | bool] = field(default_factory=dict)
     timing: dict[str, float] = field(default_factory=dict)
-    metadata: dict[str, Any] = field(default_factory=dict)
+    metadata: RunMetadata = field(default_factory=RunMetadata)
     checks: Sequence[CheckOutcome] = ()
     failure: BaseException | None = None
 

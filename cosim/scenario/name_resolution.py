@@ -186,6 +186,7 @@ def check_assignment(
         return {array: _with_element(variables[array], text, value, current)}
     if text in variables:
         return {text: check_value(variables[text], value, all_elements)}
+    names: Sequence[str] = ()
     if f"{text}[1]" in variables:
         if not isinstance(value, list) or not value:
             raise ValueError(f'"{text}" is a list of values, found {quote_value(value)}')
@@ -193,13 +194,11 @@ def check_assignment(
         if names[-1] not in variables:
             size = sum(other.startswith(f"{text}[") for other in variables)
             raise ValueError(f'"{text}" takes at most {size} values, found {len(value)}')
-        return {
-            each: check_value(variables[each], element)
-            for each, element in zip(names, value, strict=True)
-        }
-    if isinstance(value, list) and (names := vector_names(variables, text)):
-        if len(value) != len(names):
+    elif isinstance(value, list):
+        names = vector_names(variables, text)
+        if names and len(value) != len(names):
             raise ValueError(f'"{text}" takes {len(names)} values, found {len(value)}')
+    if names:
         return {
             each: check_value(variables[each], element)
             for each, element in zip(names, value, strict=True)

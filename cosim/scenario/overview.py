@@ -16,6 +16,7 @@ from ..core import __version__
 from ..core.component import scalars_of
 from ..core.system import Connection, Group, Stage, System
 from ..engine.transfer_plan import unit_conversion
+from ..results import RunMetadata
 
 #: packages whose versions can change a result
 _PACKAGES = ("numpy", "scipy", "fmpy", "pybullet", "pybullet-arm64", "pythonfmu")
@@ -52,7 +53,7 @@ def describe_system(
     }
 
 
-def describe_software() -> dict[str, Any]:
+def describe_software() -> RunMetadata:
     """Return the versions of cosim, Python and `_PACKAGES`, and the kind of machine."""
     return {
         "versions": dict(_versions()),

@@ -12,13 +12,13 @@ from hashlib import sha256
 from os.path import relpath
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
 from ..components.fmi import FmuFile, Isolation
 from ..core import resources
-from ..core.errors import InputError, Problem
+from ..core.errors import Problem
 from ..core.paths import resolve_path
 from ..core.system import System
 from ..core.text import count_noun
@@ -30,6 +30,7 @@ from ..engine.settings import Settings
 from ..process.float_mode import default_float_mode
 from ..process.journal import Deadlines, current_journal
 from ..process.process_state import exclusive_process_state
+from ..results import RunMetadata
 from .evaluation_schema import FunctionSpec
 from .file_paths import SHIPPED
 from .json_document import Document
@@ -130,7 +131,7 @@ class PreparedRun:
     @cached_property
     # paths may be relative, and a component of another thread may change the working directory
     @exclusive_process_state()
-    def metadata(self) -> dict[str, Any]:
+    def metadata(self) -> RunMetadata:
         """Metadata of the run that are known before it.
 
         Scenario, system, versions, hashes of all files.
@@ -145,7 +146,7 @@ class PreparedRun:
         }
 
     @property
-    def origin(self) -> dict[str, Any]:
+    def origin(self) -> RunMetadata:
         """Name, content and file of the scenario, and the caller's values of variables."""
         return {
             "name": self.spec.name,
@@ -261,12 +262,6 @@ def load(
         InputError: The scenario cannot be run; `problems` lists all reasons, each with file, line
             and JSON path.
     """
-    _check_choices(isolation=(isolation, IsolationMode), late=(late, LatePolicy))
-    if not isinstance(sandbox, bool):
-        raise InputError(
-            f"sandbox: expected True or False, found {sandbox!r}; only the command line has the "
-            "strict sandbox"
-        )
     times = {"/stop_time": stop_time, "/step_size": step_size}
     settings = {
         **{key: _json_time(value) for key, value in times.items() if value is not None},
@@ -306,15 +301,6 @@ def load(
         loaded.assignments,
         watch.seconds,
     )
-
-
-def _check_choices(**options: tuple[object, Any]) -> None:
-    """Check that each option, given with the Literal of its values, has one of them."""
-    for name, (value, kind) in options.items():
-        if value not in get_args(kind):
-            raise InputError(
-                f"{name}: expected one of {', '.join(map(repr, get_args(kind)))}; found {value!r}"
-            )
 
 
 def _json_time(value: TimeValue) -> float | str:

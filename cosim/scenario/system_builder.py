@@ -29,7 +29,7 @@ from .name_resolution import (
 )
 from .named_functions import find_function_problems
 from .nested_systems import Node, Scenario
-from .recorded_signals import SignalSelector, StopConditionReader
+from .recorded_signals import read_stop_conditions, select_signals
 from .schema_types import accepted
 from .sources import ComponentFactory, Creation
 from .stages import StagePlanner, parallel_mode
@@ -102,10 +102,10 @@ class SystemBuilder:
         self, aliases: Mapping[str, Endpoint], real_time: float | None, late: LatePolicy
     ) -> Settings:
         columns = self._columns(aliases)
-        stops = StopConditionReader(
+        stops, problems = read_stop_conditions(
             self.root, self.spec, self.components, columns, not self._has_missing_signals
         )
-        self.problems += stops.problems
+        self.problems += problems
         return Settings(
             self.spec.start_time,
             self.spec.stop_time,
@@ -113,7 +113,7 @@ class SystemBuilder:
             columns,
             self.spec.record.interval,
             list(self._events()),
-            stops.conditions,
+            stops,
             non_finite=self.spec.non_finite,
             real_time=real_time,
             late=late,
@@ -306,16 +306,13 @@ class SystemBuilder:
             invalid += [f"{node.prefix}.{port}" for port in node.invalid_ports]
             if node.invalid_keys & {"components", "ports"} or node.has_wrong_names:
                 invalid.append(node.prefix)
-        selector = SignalSelector(self.components, aliases, invalid)
         patterns = [
             (text, self.root.where("record", "signals", i))
             for i, text in enumerate(self.spec.record.signals)
         ]
-        columns = selector.select(patterns)
-        self.problems += selector.problems
-        self._has_missing_signals = bool(
-            invalid or selector.problems or "record" in self.root.invalid_keys
-        )
+        columns, problems = select_signals(self.components, aliases, patterns, invalid)
+        self.problems += problems
+        self._has_missing_signals = bool(invalid or problems or "record" in self.root.invalid_keys)
         return columns
 
     def _events(self) -> Iterator[Event]:

@@ -87,7 +87,8 @@ def _model_section(entry: Entry) -> str:
         for causality in _CAUSALITIES
     )
     file = Path(entry.file).relative_to(resources.root())
-    link = f"[{'Data' if file.suffix == '.json' else 'Equations and parameters'}](../../{file.as_posix()})"
+    text = "Data" if file.suffix == ".json" else "Equations and parameters"
+    link = f"[{text}](../../{file.as_posix()})"
     return "\n\n".join((f"## {entry.description}", f"Model `{entry.name}`. {link}", *tables))
 
 

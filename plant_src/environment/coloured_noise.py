@@ -85,7 +85,10 @@ class ColouredNoise:
         return self.values_in_block(number)[row]
 
     def values_in_block(self, number: int) -> Sequence[tuple[float, ...]]:
-        """Return the values of all names and channels from the grid index `number` BLOCK_LENGTH on, a tuple for each index."""
+        """Return the values of a block: all names and channels, a tuple for each grid index.
+
+        It begins at the grid index `number` BLOCK_LENGTH.
+        """
         if number != self._block_number:
             for missing in range(len(self._block_start_states) - 1, number):
                 self._compute(missing)
@@ -123,20 +126,27 @@ class ColouredNoise:
 
 
 def _covariance_root(c11: np.ndarray, c12: np.ndarray, c22: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return the elements r11, r21, r22 of the Cholesky factor of a covariance matrix (2, 2), for each channel."""
+    """Return r11, r21, r22 of the Cholesky factor of each channel's covariance matrix (2, 2)."""
     r11 = np.sqrt(c11)
     r21 = np.divide(c12, r11, out=np.zeros_like(r11), where=r11 > 0)
     return r11, r21, np.sqrt(np.maximum(c22 - r21**2, 0))
 
 
 def _correlated(root: Sequence[np.ndarray], white: np.ndarray) -> np.ndarray:
-    """Return two noises with the covariance of `root` from two white noises, shape (2, channels, n)."""
+    """Return two noises with the covariance of `root` from two white ones.
+
+    Both have the shape (2, channels, n).
+    """
     r11, r21, r22 = root
     return np.array([r11 * white[0], r21 * white[0] + r22 * white[1]])
 
 
 def _first_order_recursion(a: np.ndarray, start: np.ndarray, forcing: np.ndarray) -> np.ndarray:
-    """Return x[k + 1] = a x[k] + forcing[k] with x[0] = start along the last axis, by log2(n) array operations."""
+    """Return x[k + 1] = a x[k] + forcing[k] with x[0] = start along the last axis.
+
+    The doubling scan needs log2(n) array operations: in step s each x[k] takes a^(2^s) x[k - 2^s],
+    so that it then holds the forcings of 2^(s + 1) predecessors.
+    """
     x, reach, power = np.concatenate([start, forcing], axis=1), 1, a
     while reach < x.shape[1]:
         x[:, reach:] += power * x[:, :-reach]

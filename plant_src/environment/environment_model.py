@@ -159,7 +159,7 @@ class EnvironmentModel:
         self._highest_water[0] = abs(self._wave_gain[0]) * self._highest_elevation
 
     def water_level(self, x: float, y: float, time: float) -> float:
-        """Return the height of the water surface (m) at a position (m) and a time since the start (s)."""
+        """Return the height of the water (m) at a position (m) and a time since the start (s)."""
         return float(self._wave_gain[0] * self._elevation(x, y, time))
 
     def update(self, time: float) -> None:
@@ -175,11 +175,11 @@ class EnvironmentModel:
 
 def _bodies_with_input(bodies: Sequence[ContactBody], name: str) -> list[ContactBody]:
     """Return the vehicles that have an environment input."""
-    return [
-        body
-        for body in bodies
-        if any(variable.name == name for variable in body.model.environment_inputs)
-    ]
+
+    def has_input(body: ContactBody) -> bool:
+        return any(variable.name == name for variable in body.model.environment_inputs)
+
+    return list(filter(has_input, bodies))
 
 
 def _air_drag(vehicle: VehiclePlacement) -> list[float]:
@@ -216,13 +216,14 @@ def _output_variables(
         "elevation of the water at the centre of mass above the still water",
         "output",
     )
-    winds = [
-        replace(wind, name=f"{body.name}.{wind.name}", causality="output", start=None)
-        for body in wind_vehicles
-        for wind in WIND_INPUTS
-    ]
+    outputs = []
+    for body in wind_vehicles:
+        outputs += [
+            replace(wind, name=f"{body.name}.{wind.name}", causality="output", start=None)
+            for wind in WIND_INPUTS
+        ]
     return [
-        *winds,
+        *outputs,
         *(
             replace(elevation, name=f"{body.name}.{elevation.name}", start=None)
             for body in wave_vessels

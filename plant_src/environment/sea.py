@@ -122,11 +122,14 @@ class Sea(NamedTuple):
         return float(self.amplitude.sum())
 
     def elevation(self, x: float, y: float, time: float) -> float:
-        """Return the elevation of the water (m) at a position in the world frame (m) and a time (s)."""
+        """Return the elevation of the water (m) at a position (m, world frame) and a time (s)."""
         return self.elevation_function()(x, y, time)
 
     def component_table(self) -> np.ndarray:
-        """Return amplitude, wave number along x and y, frequency and phase, shape (5, MAX_COMPONENTS), padded with zeros."""
+        """Return amplitude, wave number along x and y, frequency and phase of each component.
+
+        The shape is (5, MAX_COMPONENTS), padded with zeros.
+        """
         east, north = (
             self.wave_number * np.cos(self.direction),
             self.wave_number * np.sin(self.direction),
@@ -136,7 +139,7 @@ class Sea(NamedTuple):
         return rows
 
     def elevation_function(self) -> Callable[[float, float, float], float]:
-        """Return a function equal to `elevation` that reuses its arrays and thus takes half the time."""
+        """Return a function equal to `elevation` that reuses its arrays, in half the time."""
         east, north = (
             self.wave_number * np.cos(self.direction),
             self.wave_number * np.sin(self.direction),
@@ -210,7 +213,10 @@ def realise_sea(waves: Waves, seed: int) -> Sea:
 def _stratified_samples(
     grid: np.ndarray, density: np.ndarray, random: np.random.Generator, count: int
 ) -> tuple[np.ndarray, float]:
-    """Return one sample from each of `count` bins with equal area under a density, in ascending order, and the total area."""
+    """Return a sample from each of `count` bins of equal area under a density, and the area.
+
+    The samples are in ascending order; the area is the total one.
+    """
     cumulative = np.concatenate(
         [[0.0], np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(grid))]
     )

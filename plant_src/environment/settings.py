@@ -147,7 +147,10 @@ def _read_significant_height(reader: JsonReader, spec: Mapping[str, Any], root: 
 
 
 def _read_velocity(reader: JsonReader, spec: Any, path: JsonPath, axes: str) -> Numbers:
-    """Read "velocity" (m/s), or "speed" (m/s) and "direction" of the flow (rad, counter-clockwise from x)."""
+    """Read "velocity" (m/s), or "speed" (m/s) and "direction" of the flow.
+
+    The direction is in rad, counter-clockwise from x.
+    """
     if not isinstance(spec, Mapping):
         return (0.0,) * len(axes)
     if "velocity" in spec:

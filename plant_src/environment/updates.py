@@ -185,7 +185,7 @@ class WaterLevelUpdate:
 
 
 def _reach(body: ContactBody) -> float:
-    """Return the distance (m) of the centre of mass above all crests within which a vehicle needs the water level."""
+    """Return the height above all crests (m) below which a vehicle needs the water level."""
     return max(body.bounding_box(body.model.body).high) + WATER_MARGIN
 
 

@@ -58,7 +58,7 @@ class Turbulence:
 
 @dataclass(frozen=True)
 class Wind:
-    """Mean velocity of the air (m/s, world frame), turbulence, and profile of the mean velocity over the height."""
+    """Mean velocity of the air (m/s, world frame), its profile over the height, turbulence."""
 
     velocity: tuple[float, float, float]
     turbulence: Turbulence | None = None
@@ -76,19 +76,25 @@ def turbulence_scale_lengths(height: float) -> tuple[float, float]:
 
 
 def turbulence_intensities(speed_20ft: float, height: float) -> tuple[float, float, float]:
-    """Return the intensities of u, v and w (m/s) at a height (m) for a wind speed at 20 ft (m/s)."""
+    """Return the intensities of u, v, w (m/s) at a height (m) for a wind at 20 ft (m/s)."""
     upwards = 0.1 * speed_20ft
     along = upwards / _height_factor(height) ** 0.4
     return along, along, upwards
 
 
 def power_law_profile(exponent: float, reference_height: float) -> WindProfile:
-    """Return the profile (z / zr)^exponent, 0 below the still water, for a reference height zr (m)."""
+    """Return the profile (z / zr)^exponent for a reference height zr (m).
+
+    Below the still water it is 0.
+    """
     return lambda z: (max(z, 0.0) / reference_height) ** exponent
 
 
 def logarithmic_profile(roughness: float, reference_height: float) -> WindProfile:
-    """Return the profile ln(z / z0) / ln(zr / z0), 0 below the roughness length z0 (m), for a reference height zr (m)."""
+    """Return the profile ln(z / z0) / ln(zr / z0) for a reference height zr (m).
+
+    Below the roughness length z0 (m) it is 0.
+    """
     reference = math.log(reference_height / roughness)
     return lambda z: math.log(max(z, roughness) / roughness) / reference
 

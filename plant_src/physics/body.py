@@ -162,7 +162,7 @@ class ContactBody:
             )
 
     def describe_invalid_state(self) -> str:
-        """Return a message that names the first input that is not finite, or the predicted state with the largest value."""
+        """Return a message about the first input that is not finite, or the largest state."""
         names = [
             *self.model.slots("input"),
             *(variable.name for variable in self.model.environment_inputs),
@@ -204,7 +204,7 @@ class FloatingBody(ContactBody):
     """
 
     def elevation_function(self, wave_count: int, waves: np.ndarray) -> Callable[[float], float]:
-        """Return a function of time (s) for the water elevation (m, above still water) at the vessel.
+        """Return the elevation of the water at the vessel (m) as a function of the time (s).
 
         Args:
             wave_count: Number of wave components.

@@ -185,7 +185,10 @@ def create_platform(client: int, platform: Platform) -> int:
 def set_dynamics(
     client: int, number: int, link: int, surface: ContactSurface = DRY, body: Body | None = None
 ) -> None:
-    """Set mass and inertia of `body`, friction and restitution, no damping and no sleeping for a Bullet body."""
+    """Set mass and inertia of `body`, friction and restitution of a body in Bullet.
+
+    It has no damping and never sleeps.
+    """
     pybullet.changeDynamics(
         number,
         link,

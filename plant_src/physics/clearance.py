@@ -26,7 +26,10 @@ _endpoint_struct = struct.Struct("6d")
 
 
 class BoundingBox(NamedTuple):
-    """Lowest and highest corner of a box (m), of a vehicle from its centre of mass, of a platform in the world frame."""
+    """Lowest and highest corner of a box (m).
+
+    That of a vehicle is relative to its centre of mass, that of a platform in the world frame.
+    """
 
     low: Vector
     high: Vector
@@ -80,7 +83,7 @@ class Clearance:
         ]
 
     def find_near_vehicles(self) -> list[bool]:
-        """Return for each vehicle whether it is near something, and update reference positions and safe distances."""
+        """Return which vehicles are near something, and update their safe boxes."""
         gaps = self._gaps()
         largest_gap = gaps.max(axis=2, keepdims=True)
         near = largest_gap < NEAR_DISTANCE
@@ -109,12 +112,12 @@ class Clearance:
         )
 
     def _gap(self, vehicle: int, other: int) -> float:
-        """Return the largest gap along an axis (m) between a vehicle and a vehicle or platform, as in `_gaps`."""
+        """Return the largest gap along an axis (m) of a vehicle to another one or a platform."""
         a, b = self._swept_box(vehicle), self._swept_box(other)
         return max(a[0] - b[3], b[0] - a[3], a[1] - b[4], b[1] - a[4], a[2] - b[5], b[2] - a[5])
 
     def _swept_box(self, index: int) -> tuple[float, ...]:
-        """Return lowest and highest corner (m, world frame) of the box that a vehicle sweeps in the step, or of a platform."""
+        """Return the corners (m, world) of the box that a vehicle sweeps, or of a platform."""
         box = self._boxes[index]
         if index >= len(self._indices):
             return box
@@ -127,7 +130,10 @@ class Clearance:
         return x + box[0], y + box[1], z + box[2], end_x + box[3], end_y + box[4], end_z + box[5]
 
     def _gaps(self) -> np.ndarray:
-        """Return the gaps (m) of each vehicle to each vehicle and platform, shape (vehicles, vehicles + platforms, axes)."""
+        """Return the gaps (m) of each vehicle to each vehicle and platform along each axis.
+
+        The shape is (vehicles, vehicles + platforms, axes).
+        """
         low = np.concatenate(
             [self._endpoints.min(axis=1) + self._vehicles[:, 0], self._platforms[:, 0]]
         )

@@ -120,9 +120,10 @@ class CompiledEquations:
             _checked_arrays(function, arrays, side)
             for side in (signature.arguments, signature.results)
         ]
-        tables = [
-            (ctypes.c_void_p * len(side))(*(array.ctypes.data for array in side)) for side in sides
-        ]
+        tables = []
+        for side in sides:
+            addresses = [array.ctypes.data for array in side]
+            tables.append((ctypes.c_void_p * len(side))(*addresses))
         pointer = getattr(self._library, function)
         pointer.restype = None
         call = partial(pointer, *map(ctypes.byref, tables))
@@ -162,7 +163,7 @@ def _rebuilding(binary: str) -> str:
 
 
 def library_path(model: str) -> Path:
-    """Return the path of the shared library of `fmus/MODEL.fmu`, unpacked to the user's cache directory.
+    """Unpack the shared library of `fmus/MODEL.fmu` to the cache and return its path.
 
     Raises:
         InputError: If the FMU cannot be read or has no binary for this platform.

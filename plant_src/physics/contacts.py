@@ -33,7 +33,7 @@ _unpack_vector = struct.Struct("3d").unpack_from
 
 
 def overlap_depths(client: int) -> dict[tuple[int, int], float]:
-    """Return the depth (m) of the deepest contact point of each pair of Bullet bodies in their present poses."""
+    """Return the depth (m) of the deepest contact point of each pair of bodies now."""
     pybullet.performCollisionDetection(client)
     depths: dict[tuple[int, int], float] = {}
     for point in pybullet.getContactPoints(physicsClientId=client):
@@ -104,7 +104,8 @@ class Contacts:
             failures.permanent_flags.reshape(-1).data,
             flags[:, TOUCHING].data,
         )
-        self._force_indices = [end - 1 for end in accumulate(len(body.outputs) for body in bodies)]
+        ends = accumulate(map(len, (body.outputs for body in bodies)))
+        self._force_indices = [end - 1 for end in ends]
         self._bodies = {body.body_id: body for body in bodies}
         self._vehicle_indices = {body.body_id: k for k, body in enumerate(bodies)}
         self._vessels = {body.body_id for body in bodies if body.model.is_vessel}
@@ -208,7 +209,7 @@ class ContactMemory:
         ]
 
     def is_unsafe(self) -> bool:
-        """Return whether several shapes of a vehicle can touch one other body at the start of the step."""
+        """Return whether several shapes of a vehicle can touch one other body in the step."""
         return any(self._is_near(*pair) for pair in self.watched_pairs)
 
     def _is_near(self, one: int, other: int) -> bool:

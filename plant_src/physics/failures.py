@@ -79,9 +79,11 @@ class Failures:
         return min(limits)
 
     def _shares(self, pair: tuple[int, int]) -> list[tuple[int, float]]:
-        """Return the share of the relative velocity that a collision takes from each of two bodies."""
+        """Return the shares of the relative velocity that a collision takes from two bodies."""
         a, b = (self._masses.get(body, math.inf) for body in pair)
-        share = 1.0 if math.isinf(b) else b / (a + b) if math.isfinite(a) else 0.0
+        share = b / (a + b) if math.isfinite(a) else 0.0
+        if math.isinf(b):
+            share = 1.0
         return [(pair[0], share), (pair[1], 1 - share)]
 
     def add_collision(self, pair: tuple[int, int], speed: float) -> None:
@@ -107,7 +109,7 @@ class Failures:
             self.alarm = True
 
     def examine(self, water_level: WaterLevel) -> list[str]:
-        """Find ditched and capsized vehicles, and return a message for each failure since the last call."""
+        """Find ditched and capsized vehicles; return a message per failure since the last call."""
         for vehicle, status in enumerate(self._step_status):
             if status >= MAY_FAIL:
                 self._examine(vehicle, water_level)

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Hashable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -21,8 +22,6 @@ from .clearance import BoundingBox, Clearance
 from .compiled_equations import CompiledEquations
 from .contacts import ContactMemory, Contacts, touching_pairs
 from .failures import Failures
-
-_Key = TypeVar("_Key", bound=Hashable)
 
 
 class VehicleArrays:
@@ -40,25 +39,19 @@ class VehicleArrays:
     """
 
     def __init__(self, sizes: Sequence[Mapping[str, int]]):
-        names = dict.fromkeys(name for size in sizes for name in size)
-        totals = {name: sum(size.get(name, 0) for size in sizes) for name in names}
-        self.buffer = np.zeros(sum(totals.values()))
-        self.of_all_vehicles = _split(self.buffer, totals)
-        views = {
-            name: _split(
-                self.of_all_vehicles[name], {k: size.get(name, 0) for k, size in enumerate(sizes)}
-            )
-            for name in names
-        }
-        self.of_vehicle = [{name: views[name][k] for name in size} for k, size in enumerate(sizes)]
-
-
-def _split(array: np.ndarray, sizes: Mapping[_Key, int]) -> dict[_Key, np.ndarray]:
-    """Return consecutive views of an array."""
-    ends = np.cumsum(list(sizes.values())).tolist()
-    return {
-        key: array[end - size : end] for (key, size), end in zip(sizes.items(), ends, strict=True)
-    }
+        totals = Counter[str]()
+        for own in sizes:
+            totals.update(own)
+        self.buffer = np.zeros(totals.total())
+        self.of_all_vehicles: dict[str, np.ndarray] = {}
+        self.of_vehicle: list[dict[str, np.ndarray]] = [{} for _ in sizes]
+        first = 0
+        for name, total in totals.items():
+            self.of_all_vehicles[name] = self.buffer[first : first + total]
+            for own, arrays in zip(sizes, self.of_vehicle, strict=True):
+                if name in own:
+                    arrays[name] = self.buffer[first : first + own[name]]
+                    first += own[name]
 
 
 #: limit of the repetitions of a Bullet step that keep planar vessels at their height
@@ -89,7 +82,7 @@ class FleetState:
 
 
 class Fleet:
-    """Vehicles that move by their own equations, and contact between them and the platforms by Bullet.
+    """Vehicles that move by their own equations, with contact resolved by Bullet.
 
     Args:
         client: Number of the Bullet client.
@@ -160,7 +153,10 @@ class Fleet:
         self._set_active_bodies([True] * len(self.bodies))
 
     def _warm_up_inertia(self) -> None:
-        """Make one Bullet step without contact, because Bullet applies a changed inertia only from the next step on."""
+        """Make one Bullet step without contact.
+
+        Bullet applies a changed inertia only from the next step on.
+        """
         for active in (False, True):
             for body in self.bodies:
                 body.set_active(active)
@@ -191,7 +187,7 @@ class Fleet:
             self._publish_contacts(step_fraction)
 
     def _handle_step_status(self) -> None:
-        """Refuse an invalid state, report possible failures, and find the vehicles that are near something if necessary."""
+        """Refuse an invalid state, report possible failures, find near vehicles if necessary."""
         statuses = self._step_status.tolist()
         if INVALID_STATE in statuses:
             raise InvalidStateError(
@@ -205,7 +201,7 @@ class Fleet:
         self._near_vehicles_outdated = False
 
     def _update_near_vehicles(self) -> None:
-        """Activate the bodies of the vehicles that are near something, and deactivate the others."""
+        """Activate the bodies of vehicles that are near something; deactivate the others."""
         near = self.clearance.find_near_vehicles()
         self._contact_memory.watch(self.clearance.near_pairs or ())
         if near != self._is_near:
@@ -296,7 +292,7 @@ class Fleet:
         self.contacts.has_contacts = bool(state.flags.any())
 
     def _remove_contact_points(self) -> None:
-        """Move all vehicles out of the reach of each other, so that Bullet has no contact points."""
+        """Move all vehicles apart, so that Bullet has no contact points."""
         for body in self._active_bodies:
             body.set_active(False)
         pybullet.performCollisionDetection(self._client)

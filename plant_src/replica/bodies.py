@@ -80,7 +80,10 @@ class Quadcopter:
         )
 
     def apply(self, loads: np.ndarray) -> None:
-        """Apply four thrusts (N) and four propeller torques (N m) in the next step of Bullet, fixed in the world frame."""
+        """Apply four thrusts (N) and propeller torques (N m) in the next step of Bullet.
+
+        They are fixed in the world frame.
+        """
         centre, to_world = self._pose()
         force, torque = to_world[:, 2] * loads[0:4].sum(), to_world @ (_TORQUE_MATRIX @ loads)
         options = {"flags": pybullet.WORLD_FRAME, "physicsClientId": self._client}
@@ -103,7 +106,10 @@ class Quadcopter:
         ), from_original @ velocity + position
 
     def _pose(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the centre of mass (m) and the rotation matrix from the forward-left-up body frame to the world."""
+        """Return the centre of mass (m) and the rotation from the body frame to the world.
+
+        The body frame is forward-left-up.
+        """
         centre, orientation = pybullet.getBasePositionAndOrientation(self.body, self._client)
         principal = np.array(pybullet.getMatrixFromQuaternion(orientation)).reshape(3, 3)
         return np.array(centre), principal @ self._axes.T
@@ -133,7 +139,7 @@ class Vessel:
         set_dynamics(client, self.body, 2, body=strider.BODY)
 
     def apply(self, loads: np.ndarray) -> None:
-        """Apply propeller thrust, rudder X and Y, water X and Y (N) and water N (N m) in the next step of Bullet."""
+        """Apply propeller thrust, rudder X, Y, water X, Y (N) and N (N m) in the next step."""
         thrust, rudder_x, rudder_y, water_x, water_y, moment = loads
         yaw = self._joints()[0][2]
         force = _rotation_about_z(yaw)[:2, :2] @ [thrust + rudder_x + water_x, rudder_y + water_y]
@@ -147,7 +153,10 @@ class Vessel:
         )
 
     def measure(self) -> np.ndarray:
-        """Return position (m), velocity (m/s), angular velocity (rad/s) and yaw (rad) as published, shape (10,)."""
+        """Return position, velocity, angular velocity and yaw as published, shape (10,).
+
+        The units are m, m/s, rad/s and rad.
+        """
         (x, y, yaw), (vx, vy, rate) = self._joints()
         wrapped = math.pi - (math.pi - yaw) % (2 * math.pi)
         return np.array([x, y, strider.BODY.height, vx, vy, 0.0, 0.0, 0.0, rate, wrapped])
@@ -186,7 +195,10 @@ def _create_jointed_hull(client: int) -> int:
 
 
 def attitude(to_world: np.ndarray) -> np.ndarray:
-    """Return phi, theta, psi (rad) of a rotation matrix (3, 3) from the forward-right-down body frame to the world."""
+    """Return phi, theta, psi (rad) of a rotation matrix (3, 3), body to world.
+
+    The body frame is forward-right-down.
+    """
     r = to_world
     theta = math.asin(max(-1.0, min(1.0, r[2, 0])))
     return np.array([math.atan2(-r[2, 1], -r[2, 2]), theta, math.atan2(-r[1, 0], r[0, 0])])

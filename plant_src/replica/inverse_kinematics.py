@@ -23,10 +23,11 @@ _FILTER_STATES = [f"filter[{i}]" for i in range(1, FILTER_ORDER + 1)]
 
 
 class InverseKinematics(ReplicaFmu):
-    """Controller that computes tilt commands (rad) and throttle (%) from acceleration commands (m/s2).
+    """Controller from acceleration commands (m/s2) to tilt commands (rad) and throttle (%).
 
-    The vertical force is the output of an altitude loop behind a low-pass filter. It starts at `initial_force` (N): 0 as
-    published, which makes the first tilt commands very large. The weight is a better start value.
+    The vertical force is the output of an altitude loop behind a low-pass filter. It starts at
+    `initial_force` (N): 0 as published, which makes the first tilt commands very large. The weight
+    is a better start value.
     """
 
     description = "Attitude and throttle from accelerations"
@@ -90,9 +91,12 @@ class InverseKinematics(ReplicaFmu):
 
 
 def low_pass_matrices(step_size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the discretised Butterworth low-pass x(k+1) = M x(k) + g u(k) by the published third-order Runge-Kutta method.
+    """Return the discretised Butterworth low-pass x(k+1) = M x(k) + g u(k).
 
-    The filter is a first-order section followed by seven second-order sections with the states (derivative, output).
+    It is discretised by the published third-order Runge-Kutta method.
+
+    The filter is a first-order section followed by seven second-order sections with the states
+    (derivative, output).
 
     Args:
         step_size: Sample period (s).
@@ -139,14 +143,21 @@ class AccelerationProfiles(ReplicaFmu):
 
 
 def return_move_acceleration(time: float) -> float:
-    """Return the acceleration (m/s2) at `time` (s) of a minimum-jerk move of 10 m in 10 s and of the same move back."""
+    """Return the acceleration (m/s2) of a minimum-jerk move of 10 m in 10 s and back."""
     s = time / 10 % 1
     forth = (60 * s - 180 * s**2 + 120 * s**3) / 10
-    return forth if time < 10 else -forth if time < 20 else 0.0
+    return _there_and_back(forth, time)
 
 
 def stop_move_acceleration(time: float) -> float:
-    """Return the acceleration (m/s2) at `time` (s) to 10 m/s within 10 s and back to rest within 10 s (100 m)."""
+    """Return the acceleration (m/s2) to 10 m/s within 10 s and to rest within 10 s (100 m)."""
     s = time / 10 % 1
     faster = 30 * s**2 * (1 - s) ** 2
-    return faster if time < 10 else -faster if time < 20 else 0.0
+    return _there_and_back(faster, time)
+
+
+def _there_and_back(value: float, time: float) -> float:
+    """Return a value in the first 10 s, its negative in the next 10 s, and 0 afterwards."""
+    if time < 10:
+        return value
+    return -value if time < 20 else 0.0

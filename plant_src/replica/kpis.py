@@ -1,4 +1,4 @@
-"""KPIs for the comparison of the replica with the published simulator, in SI units at recorded rows."""
+"""KPIs that compare the replica with the published simulator, in SI units."""
 
 from __future__ import annotations
 

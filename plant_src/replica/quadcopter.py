@@ -42,9 +42,8 @@ class Vtol(ReplicaFmu):
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Compute horizontal error and altitude reference."""
         value = self.values
-        position, target = (
-            [value[name] for name in names] for names in (POSITION_INPUTS, TARGET_INPUTS)
-        )
+        position = [value[name] for name in POSITION_INPUTS]
+        target = [value[name] for name in TARGET_INPUTS]
         value["horizontal_error"] = math.dist(position, target)
         value["altitude_reference"] = self._reference(current_time)
         return True
@@ -62,7 +61,7 @@ class Vtol(ReplicaFmu):
 
 
 class PositionController(ReplicaFmu):
-    """Position and velocity loops with the outputs phi (rad, right side down) and theta (rad, nose up)."""
+    """Position and velocity loops to phi (rad, right side down) and theta (rad, nose up)."""
 
     description = "Position and velocity loops"
 

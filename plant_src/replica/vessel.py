@@ -45,7 +45,10 @@ class Waypoints(ReplicaFmu):
 
 
 class Autopilot(ReplicaFmu):
-    """Autopilot: thrust (N) proportional to the speed error, rudder angle (rad) by PD on the wrapped heading error."""
+    """Autopilot: thrust (N) by the speed error, rudder angle (rad) by the heading error.
+
+    The thrust is proportional; the rudder has a PD law for the wrapped error.
+    """
 
     description = "Speed and heading control"
 

@@ -128,7 +128,6 @@ class World(Component):
             )
 
     # -- values
-    # --------------------------------------------------------------------------------------------------------
 
     def set(self, name: str, value: Any) -> None:
         """Set an input. Raises ComponentError for an output or an unknown name."""
@@ -175,7 +174,6 @@ class World(Component):
             recorded[:] = self.get(name)
 
     # -- life cycle
-    # ----------------------------------------------------------------------------------------------------
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
         """Do nothing: the initial outputs follow from the arguments."""
@@ -237,7 +235,6 @@ class World(Component):
         self._release()
 
     # -- state
-    # ---------------------------------------------------------------------------------------------------------
 
     def get_state(self) -> ReplicaState:
         """Return a copy of the state."""

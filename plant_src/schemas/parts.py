@@ -83,7 +83,9 @@ def list_schema(items: Schema, description: str, longest: int | None) -> Schema:
 def placed_schema(
     hub: str, thrust: str, properties: Mapping[str, Schema], required: tuple[str, ...]
 ) -> Schema:
-    """Return the schema of a rotor, thruster or propeller with a place, or with a link of a URDF file in place of it.
+    """Return the schema of a rotor, thruster or propeller.
+
+    It has a place, or a link of a URDF file in place of it.
 
     Args:
         hub: The point at `position`, in words.

@@ -23,7 +23,10 @@ from .parts import (
 
 
 def world_schema() -> Schema:
-    """Return the JSON Schema of the arguments of a world, with the kinds of objects in them under `$defs`."""
+    """Return the JSON Schema of the arguments of a world.
+
+    The kinds of objects in them are under `$defs`.
+    """
     root = documented_object(
         "Arguments of the plant `plant_src/world.py:World`.",
         {

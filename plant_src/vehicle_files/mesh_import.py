@@ -25,10 +25,8 @@ _SIDES = 24  # of a cylinder or sphere
 
 def box_triangles(edges: Sequence[float]) -> np.ndarray:
     """Return the triangles of a box with these edges (m) around the origin, shape (12, 3, 3)."""
-    ring = [(1, 1), (-1, 1), (-1, -1), (1, -1)]
-    return _stacked(
-        np.array([[(x, y, z) for x, y in ring] for z in (-1, 1)]) * np.asarray(edges) / 2
-    )
+    bottom = np.array([(1, 1, -1), (-1, 1, -1), (-1, -1, -1), (1, -1, -1)])
+    return _stacked(np.stack([bottom, bottom * (1, 1, -1)]) * np.asarray(edges) / 2)
 
 
 def cylinder_triangles(radius: float, length: float) -> np.ndarray:
@@ -52,7 +50,10 @@ def _ring(radius: float, height: float) -> np.ndarray:
 
 
 def _stacked(rings: np.ndarray) -> np.ndarray:
-    """Return the closed surface through rings of points from bottom to top, seen counter-clockwise from above (levels, n, 3)."""
+    """Return the closed surface through rings of points, shape (levels, n, 3).
+
+    The rings are from bottom to top and counter-clockwise, seen from above.
+    """
     following = np.roll(rings, -1, axis=1)
     lower = np.stack([rings[:-1], following[:-1], following[1:]], axis=2)
     upper = np.stack([rings[:-1], following[1:], rings[1:]], axis=2)
@@ -73,7 +74,10 @@ FORMATS = "STL, OBJ, GLB, PLY"
 
 
 class ImportedVehicle(NamedTuple):
-    """Data of a vehicle, centre of mass in the frame of the imported file (m), and probable mistakes in that file."""
+    """Data of a vehicle, centre of mass, and probable mistakes in the imported file.
+
+    The centre of mass is in the frame of that file (m).
+    """
 
     data: dict[str, Any]
     centre: list[float]
@@ -126,7 +130,7 @@ def convex_pieces(mesh: Any) -> list[np.ndarray]:
 
 
 def piece_data(points: np.ndarray, source: str) -> dict[str, Any]:
-    """Return an element of "boxes" of a vehicle file for the points (m, body frame) of a convex piece."""
+    """Return the element of "boxes" for the points (m, body frame) of a convex piece."""
     return {"points": np.round(points, _DIGITS).tolist(), "source": source}
 
 

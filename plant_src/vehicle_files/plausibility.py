@@ -1,4 +1,7 @@
-"""Probable mistakes in the data of a vehicle that can run nevertheless, most of them wrong units."""
+"""Probable mistakes in the data of a vehicle, most of them wrong units.
+
+The vehicle can run nevertheless.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +42,10 @@ _DOWNWARDS = -0.1
 
 
 def placement_warnings(vehicle: VehiclePlacement) -> Iterator[Problem]:
-    """Yield a warning for each value of a vehicle in a world that is probably wrong, with its path in the component."""
+    """Yield a warning for each value of a vehicle in a world that is probably wrong.
+
+    The subject is its path in the component.
+    """
     path = ("arguments", "vehicles", vehicle.name)
     for each in vehicle_warnings(vehicle.model):
         yield replace(each, subject=(*path, "model", *each.subject[1:]))
@@ -88,7 +94,9 @@ def _reach(model: Model) -> float:
 def _actuators(model: Model) -> Sequence[Rotor | Thruster | Propeller]:
     if model.airframe:
         return model.airframe.rotors
-    return model.craft.thrusters if model.craft else model.boat.propellers if model.boat else ()
+    if model.craft:
+        return model.craft.thrusters
+    return model.boat.propellers if model.boat else ()
 
 
 def _size_warnings(model: Model) -> Iterator[Problem]:

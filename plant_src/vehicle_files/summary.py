@@ -28,7 +28,7 @@ _MIN_LEVER = 1e-6
 
 
 def boat_properties(boat: Boat) -> Iterator[tuple[str, str]]:
-    """Yield name and text of the draught, the top speed, and the inputs that turn the vessel to either side."""
+    """Yield name and text of draught, top speed, and the inputs that turn the vessel."""
     if isinstance(boat, SurfaceVessel):
         yield "draught", f"{boat.draught:.4g} m"
     if speed := top_speed(boat):

@@ -81,7 +81,9 @@ def vehicle_from_urdf(path: Path, data: Mapping[str, Any]) -> ImportedVehicle:
         (link, Pose(poses[name].rotation, poses[name].position - origin))
         for name, link in urdf.links.items()
     ]
-    boxes = [box for link, pose in frames for box in _collision_shape(urdf, link, pose)]
+    boxes: list[dict[str, Any]] = []
+    for link, pose in frames:
+        boxes += _collision_shape(urdf, link, pose)
     if not boxes and "boxes" not in data:
         raise InputError(
             Problem(
@@ -109,7 +111,9 @@ def vehicle_from_urdf(path: Path, data: Mapping[str, Any]) -> ImportedVehicle:
     if "visual" not in data and any(
         link.find("visual") is not None for link in urdf.links.values()
     ):
-        triangles = [mesh for link, pose in frames for mesh in _drawn_shapes(urdf, link, pose)]
+        triangles: list[np.ndarray] = []
+        for link, pose in frames:
+            triangles += _drawn_shapes(urdf, link, pose)
         result["visual"] = mesh_import.visual_data(np.concatenate(triangles), source)
     for key in NAMED_LISTS:
         if isinstance(elements := data.get(key), list):
@@ -202,9 +206,9 @@ def _inertia(urdf: UrdfFile, inertial: ET.Element) -> np.ndarray:
     Missing products of inertia are 0.
     """
     element = urdf.child(inertial, "inertia")
-    moments = {axes: urdf.number(element, f"i{axes}") for axes in ("xx", "yy", "zz")}
-    values = moments | {axes: urdf.number(element, f"i{axes}", "0") for axes in ("xy", "xz", "yz")}
-    return np.array([[values["".join(sorted(row + column))] for column in "xyz"] for row in "xyz"])
+    xx, yy, zz = (urdf.number(element, name) for name in ("ixx", "iyy", "izz"))
+    xy, xz, yz = (urdf.number(element, name, "0") for name in ("ixy", "ixz", "iyz"))
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def _link_warnings(urdf: UrdfFile) -> Iterator[str]:
@@ -228,12 +232,10 @@ def _link_warnings(urdf: UrdfFile) -> Iterator[str]:
 
 def _angle_warnings(urdf: UrdfFile) -> Iterator[str]:
     """Yield a warning about the first angles of more than a turn, with the number of the others."""
-    origins = [
-        origin
-        for part in urdf.root
-        if part.tag in ("link", "joint")
-        for origin in part.iter("origin")
-    ]
+    origins: list[ET.Element] = []
+    for part in urdf.root:
+        if part.tag in ("link", "joint"):
+            origins += part.iter("origin")
     angles = [(origin, urdf.numbers(origin, "rpy", 3, "0 0 0")) for origin in origins]
     large = [(origin, numbers) for origin, numbers in angles if max(abs(numbers)) > 2 * np.pi]
     if large:
@@ -278,7 +280,7 @@ def _edges(urdf: UrdfFile, shape: ET.Element) -> np.ndarray:
 
 
 def _drawn_shapes(urdf: UrdfFile, link: ET.Element, pose: Pose) -> Iterator[np.ndarray]:
-    """Yield the triangles of the visual shapes of a link, or else of its collision shapes, each of shape (n, 3, 3)."""
+    """Yield the triangles of the visual or else collision shapes of a link, shape (n, 3, 3)."""
     for element in link.findall("visual") or link.findall("collision"):
         yield (pose @ _origin(urdf, element)).transformed(
             _triangles(urdf, urdf.child(element, "geometry/*"))
@@ -319,7 +321,7 @@ def _mesh(urdf: UrdfFile, shape: ET.Element) -> Any:
 def _placed_elements(
     elements: list[Any], poses: Mapping[str, Pose], origin: np.ndarray, key: str
 ) -> list[Any]:
-    """Return rotors, thrusters or propellers with their positions relative to the origin of the vehicle file."""
+    """Return actuators with positions relative to the origin of the vehicle file."""
     used: dict[str, int] = {}
     for i, element in enumerate(elements):
         if isinstance(element, Mapping) and "link" in element:

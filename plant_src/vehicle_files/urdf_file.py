@@ -31,7 +31,9 @@ class UrdfFile:
         self.path = path
         self._lines: dict[ET.Element, int] = {}
         self.root = self._parse()
-        self._owners = {part: child for child in self.root for part in child.iter()}
+        self._owners: dict[ET.Element, ET.Element] = {}
+        for child in self.root:
+            self._owners |= dict.fromkeys(child.iter(), child)
         self._check_elements()
         self.links = self._by_name("link")
         self._by_name("joint")

@@ -80,7 +80,10 @@ def _boat_warnings(boat: Boat, corners: np.ndarray) -> Iterator[Problem]:
 
 
 def _craft_warnings(craft: Craft, reach: float) -> Iterator[Problem]:
-    """Yield warnings about a submerged vehicle whose farthest corner is `reach` (m) from the centre of mass."""
+    """Yield warnings about a submerged vehicle.
+
+    Its farthest corner is `reach` (m) from the centre of mass.
+    """
     thrusts = [each.thrust_coefficient * craft.max_thruster_speed**2 for each in craft.thrusters]
     path = ("thrusters", str(int(np.argmax(thrusts))), "thrust_coefficient")
     cause = _cause(craft.max_thruster_speed, craft.thruster_radius, path, ("thruster", "max_speed"))
@@ -137,7 +140,7 @@ def surge_damping(boat: Boat) -> tuple[float, float, float]:
 
 
 def _resistance_warnings(*coefficients: float) -> Iterator[Problem]:
-    """Yield a warning if all coefficients of forces of the water that limit the speed ahead are 0."""
+    """Yield a warning if no force of the water limits the speed ahead."""
     if not any(coefficients):
         text = (
             "the water has no resistance ahead: the elements for u are 0, here and in "
@@ -158,7 +161,7 @@ def _azimuth_warnings(propellers: Sequence[Propeller]) -> Iterator[Problem]:
 
 
 def _bounds(boat: Boat, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lowest and highest coordinates (m, from O) of boxes and hull, each of shape (3,)."""
+    """Return lowest and highest coordinates (m, from O) of boxes and hull, shape (3,) each."""
     low, high = corners.min(axis=0), corners.max(axis=0)
     if isinstance(boat, SurfaceVessel):
         hull = boat.hull
@@ -187,7 +190,7 @@ def _position_warnings(boat: Boat, low: np.ndarray, high: np.ndarray) -> Iterato
 
 
 def _height_warnings(boat: Boat, top: float) -> Iterator[Problem]:
-    """Yield a warning if the centre of mass is above hull and boxes by more than the depth of the hull."""
+    """Yield a warning if the centre of mass is above everything by more than the hull's depth."""
     if (
         isinstance(boat, SurfaceVessel)
         and (height := boat.centre_of_mass[2] - top) > boat.hull.depth
@@ -248,7 +251,10 @@ def _draught_warnings(vessel: SurfaceVessel) -> Iterator[Problem]:
 
 
 def _mass_warnings(mass: float, displaced: float, source: str) -> Iterator[Problem]:
-    """Yield a warning if the mass (kg) and the displaced mass that a quantity of the file gives (kg) differ too much."""
+    """Yield a warning if the mass (kg) and a displaced mass (kg) differ too much.
+
+    The displaced mass follows from the quantity `source` of the file.
+    """
     ratio = max(mass, displaced) / min(mass, displaced)
     if ratio > MAX_MASS_RATIO:
         is_pound = math.isclose(mass / displaced, 1 / KNOWN_UNITS["lb"].factor, rel_tol=0.05)

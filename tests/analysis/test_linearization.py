@@ -58,7 +58,7 @@ def test_the_hovering_quadcopter_has_the_jacobian_of_its_closed_form(hover):
 
 
 def test_the_sailing_vessel_has_the_jacobian_of_its_equations():
-    """Differences of the original system's equations at 1 m/s, with the thrust that a trim finds."""
+    """Differences of the original equations at 1 m/s, with the thrust that a trim finds."""
     fmu = str(resources.root() / "fmus/strider.fmu")
     scenario = {
         "name": "vessel",

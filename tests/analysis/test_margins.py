@@ -149,7 +149,7 @@ def test_names_that_are_no_loops_are_refused():
 def test_the_response_of_the_nonlinear_system_agrees_with_the_linear_model_below_the_crossover(
     excitation,
 ):
-    """Yaw of the quadcopter in flight: all frequencies from a fifth of the crossover on within 2 %."""
+    """Yaw of the quadcopter in flight: from a fifth of the crossover on within 2 %."""
     scenario, parameters, loops = (
         "free_flight",
         {"/components/usv/parameters/speed_command": 0.5},

@@ -9,7 +9,7 @@ from typing import Literal
 from xml.etree import ElementTree
 
 from cosim.export.fmu.block import Block, BlockVariable
-from cosim.export.fmu.model_description import model_description_xml, to_bytes
+from cosim.export.fmu.description_xml import model_description_xml, to_bytes
 from cosim.export.fmu.package import compile_binary, content_token, fmi_headers, write_archive
 
 PROGRAMS = Path(__file__).parent / "programs"

@@ -145,18 +145,16 @@ def compare(path: Path, published: Path, interface: str, method: Any) -> str:
     except (InputError, ComponentError) as error:
         return f"failed: {error}"
     found = {name: result[name] for name in result}
-    cells = [
-        f"{largest_difference(found | {'time': result.time.round(12)}, expected | {'time': time.round(12)}):.2g}"
-    ]
+    with_times = found | {"time": result.time.round(12)}
+    cells = [f"{largest_difference(with_times, expected | {'time': time.round(12)}):.2g}"]
     if method != "cvode" and not any("[" in name for name in found):  # the plain loop has no arrays
         plain = plain_loop(path, interface, [float(t) for t in result.time], internal, list(found))
         cells.append(f"{largest_difference(found, plain):.2g}")
     cells += ["-"] * (2 - len(cells))
     signals, solution = EXACT.get(path.stem, ([], None))
     if method == "cvode" and solution:
-        cells.append(
-            f"{largest_difference(found, dict(zip(signals, solution(result.time), strict=True))):.2g}"
-        )
+        exact = dict(zip(signals, solution(result.time), strict=True))
+        cells.append(f"{largest_difference(found, exact):.2g}")
     return " | ".join([*cells, *["-"] * (3 - len(cells))])
 
 

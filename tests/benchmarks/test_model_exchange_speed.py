@@ -28,10 +28,13 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <ModelExchange modelIdentifier="lag"/>
 <ModelVariables>
 <ScalarVariable name="u" valueReference="0" causality="input"><Real start="0"/></ScalarVariable>
-<ScalarVariable name="y1" valueReference="1" causality="output" initial="exact"><Real start="1"/></ScalarVariable>
-<ScalarVariable name="der(x)" valueReference="2" causality="local"><Real derivative="2"/></ScalarVariable>
+<ScalarVariable name="y1" valueReference="1" causality="output" initial="exact">
+<Real start="1"/></ScalarVariable>
+<ScalarVariable name="der(x)" valueReference="2" causality="local">
+<Real derivative="2"/></ScalarVariable>
 </ModelVariables>
-<ModelStructure><Outputs><Unknown index="2"/></Outputs><Derivatives><Unknown index="3"/></Derivatives></ModelStructure>
+<ModelStructure><Outputs><Unknown index="2"/></Outputs>
+<Derivatives><Unknown index="3"/></Derivatives></ModelStructure>
 </fmiModelDescription>"""
 pytestmark = [
     pytest.mark.benchmark,

@@ -21,7 +21,10 @@ SECONDS = 2
 SMALLEST_RATE = 3
 MOMENTS = """(seconds) => new Promise((done) => {
   const moments = [], end = performance.now() + 1000 * seconds;
-  const frame = (now) => (moments.push(now), now < end ? requestAnimationFrame(frame) : done(moments));
+  const frame = (now) => {
+    moments.push(now);
+    now < end ? requestAnimationFrame(frame) : done(moments);
+  };
   requestAnimationFrame(frame);
 })"""
 

@@ -27,8 +27,9 @@ class Sleeper(Fmi2Slave):
     def __init__(self, **more):
         super().__init__(**more)
         self.busy, self.y, self.number = 0.0, 0.0, 0.0
-        self.register_variable(Real("busy", causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
-        self.register_variable(Real("number", causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
+        tunable = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.tunable}
+        self.register_variable(Real("busy", **tunable))
+        self.register_variable(Real("number", **tunable))
         self.register_variable(Real("y", causality=Fmi2Causality.output))
 
     def do_step(self, time, step):

@@ -113,13 +113,16 @@ CUT_TABLES = (
     "one.clientWidth).length"
 )
 #: titles and names in tables of which a word stands on two lines
-BROKEN_TITLES = """[...document.querySelectorAll("h1, h2, h3, table:not([data-stacked]) td:first-child code")].filter((title) => {
+BROKEN_TITLES = """[...document.querySelectorAll(
+  "h1, h2, h3, table:not([data-stacked]) td:first-child code"
+)].filter((title) => {
   const texts = document.createTreeWalker(title, NodeFilter.SHOW_TEXT);
   while (texts.nextNode()) for (const word of texts.currentNode.data.matchAll(/[A-Za-z0-9]+/g)) {
     const range = document.createRange();
     range.setStart(texts.currentNode, word.index);
     range.setEnd(texts.currentNode, word.index + word[0].length);
-    if (new Set([...range.getClientRects()].map((box) => Math.round(box.top))).size > 1) return true;
+    const tops = [...range.getClientRects()].map((box) => Math.round(box.top));
+    if (new Set(tops).size > 1) return true;
   }
 }).map((title) => title.innerText)"""
 

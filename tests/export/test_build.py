@@ -16,7 +16,7 @@ from cosim.core.errors import InputError
 from cosim.export import build_check
 from cosim.export.build import build, build_to, cached_fmu, read_manifest
 from cosim.export.build_check import check_fmus
-from cosim.export.sources import classify_source, find_sources, snake_case, tool_version
+from cosim.export.fmu_sources import classify_source, find_sources, snake_case, tool_version
 
 pytestmark = pytest.mark.slow
 

@@ -16,7 +16,7 @@ from cosim.core.errors import InputError
 from cosim.core.resources import root
 from cosim.export.build import build, build_to, read_manifest
 from cosim.export.build_check import check_fmus
-from cosim.export.sources import find_sources
+from cosim.export.fmu_sources import find_sources
 
 pytestmark = pytest.mark.slow
 

@@ -14,8 +14,8 @@ from cosim.components.fmi import FmuFile
 from cosim.core.errors import InputError
 from cosim.core.units import KNOWN_UNITS, parse_unit
 from cosim.export.fmu.block import Block, BlockVariable
-from cosim.export.fmu.interface import check_block
-from cosim.export.fmu.model_description import model_description_xml
+from cosim.export.fmu.description_xml import model_description_xml
+from cosim.export.fmu.variable_table import check_block
 
 
 def variables(fmu):

@@ -147,7 +147,7 @@ def test_initialization_depends_on_parameters_and_can_be_repeated(compiled: Comp
 
 
 def exact(time: float) -> float:
-    """The model oscillates from x = 1 with the angular frequency 2 around the equilibrium 0.5 / 4."""
+    """The model oscillates from x = 1 with 2 rad/s around the equilibrium 0.5 / 4."""
     return 0.125 + 0.875 * math.cos(2 * time)
 
 

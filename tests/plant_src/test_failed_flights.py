@@ -1,4 +1,4 @@
-"""Flights that fail: they end soon after the crash, with exit code 3 and their cause on one line."""
+"""Flights that fail: they end soon after the crash, with exit code 3 and one line of cause."""
 
 from __future__ import annotations
 
@@ -27,7 +27,15 @@ class Controller(Fmi2Slave):
             self.register_variable(Real(name, causality=Fmi2Causality.output, getter=speed))
         for name in ("vehicle.position.z", "target.position.z"):
             setter = lambda value: None
-            self.register_variable(Real(name, causality=Fmi2Causality.input, start=0.0, getter=lambda: 0.0, setter=setter))
+            self.register_variable(
+                Real(
+                    name,
+                    causality=Fmi2Causality.input,
+                    start=0.0,
+                    getter=lambda: 0.0,
+                    setter=setter,
+                )
+            )
         self.register_variable(Real("mode", causality=Fmi2Causality.output, getter=lambda: 0.0))
 
     def do_step(self, time, step_size):

@@ -87,7 +87,7 @@ def speeds() -> list[float]:
 
 
 def in_process(names: list[str]) -> Iterator[list[Any]]:
-    """Return the outputs of the world itself on the same flight, beginning with the initial values."""
+    """Return the outputs of the world itself on the same flight, initial values first."""
     trial = WorldHarness(**ARGUMENTS)
     trial["usv.thrust"] = 1.0
     yield [trial[name] for name in names]

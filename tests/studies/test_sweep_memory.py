@@ -29,7 +29,7 @@ def proportional_kilobytes(processes):
 
 
 def test_100_000_runs_take_less_than_300_megabytes(lag):
-    """Only the last 100 runs are made; records of the others, of realistic length, exist already."""
+    """Only the last 100 runs are made; records of the others exist and are as long as real ones."""
     half = {"range": {"min": 1.0, "max": 2.0, "count": RUNS // 2}}
     sweep = lag.write(
         factors=[

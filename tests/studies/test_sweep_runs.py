@@ -308,7 +308,8 @@ class Noise(Fmi2Slave):
     def __init__(self, **arguments):
         super().__init__(**arguments)
         self.seed, self.seeded, self.unseeded = 0, 0.0, 0.0
-        self.register_variable(Integer("seed", causality=Fmi2Causality.parameter, variability=Fmi2Variability.fixed))
+        fixed = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.fixed}
+        self.register_variable(Integer("seed", **fixed))
         for name in ("seeded", "unseeded"):
             self.register_variable(Real(name, causality=Fmi2Causality.output))
 

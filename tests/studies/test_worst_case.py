@@ -1,4 +1,7 @@
-"""Searches for the run that breaks a lag: y = (1 - h / T)^10 after ten Euler steps of h = 0.01 s."""
+"""Searches for the run that breaks a lag.
+
+After ten Euler steps of h = 0.01 s it has y = (1 - h / T)^10.
+"""
 
 from __future__ import annotations
 

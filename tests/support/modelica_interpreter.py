@@ -19,7 +19,7 @@ import numpy as np
 from cosim.core.errors import ComponentError
 from cosim.export.modelica import ModelicaOptions, assemble
 from cosim.export.modelica.causality.analysed_model import AnalysedModel
-from cosim.export.modelica.causality.schedule import finite_variables, pre_variables
+from cosim.export.modelica.causality.computation_order import finite_variables, pre_variables
 from cosim.export.modelica.frontend.rumoca_frontend import DEFAULT_OPTIONS
 from cosim.export.modelica.model.arithmetic import EvaluationError, divide
 from cosim.export.modelica.model.evaluate import Evaluator

@@ -35,7 +35,8 @@ _ROTORS = np.array(
 )
 _UP_TORQUE = (1, -1, 1, -1)
 MAX_ROTOR_SPEED = 5000 * 0.10471976
-#: N s2/rad2, identified from a flight (docs/validation_measurements.md); the original system has 9.148e-6
+#: N s2/rad2, identified from a flight (docs/validation_measurements.md); the original system has
+#: 9.148e-6
 THRUST_COEFFICIENT = 8.24e-6
 HOVER_SPEED = np.sqrt(QUADCOPTER_MASS * GRAVITY / 4 / THRUST_COEFFICIENT)
 

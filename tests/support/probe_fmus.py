@@ -1,4 +1,4 @@
-"""Probe FMUs: small FMUs of both FMI versions, hand-written in C and built once per test session."""
+"""Probe FMUs: small FMUs of both FMI versions in C, built once per test session."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Equations of a submerged vehicle a second time, in NumPy (Fossen 2021), below and at the surface."""
+"""Equations of a submerged vehicle once more, in NumPy (Fossen 2021), also at the surface."""
 
 from __future__ import annotations
 

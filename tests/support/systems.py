@@ -15,7 +15,7 @@ from cosim.engine.settings import Event, Settings
 
 
 def endpoint(name: str) -> Endpoint:
-    """Return the endpoint of a name such as "a.y"; the text before the last dot is the component."""
+    """Return the endpoint of a name such as "a.y": component before the last dot, then scalar."""
     component, _, scalar = name.rpartition(".")
     return Endpoint(component, scalar)
 

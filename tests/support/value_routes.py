@@ -117,7 +117,7 @@ def parts_of(value: Any) -> list[Any]:
 
 @functools.cache
 def is_of_the_project(kind: type) -> bool:
-    """Return whether a class is defined in a file of the packages, whatever its module is called."""
+    """Return whether a class is defined in a file of the packages, whatever its module's name."""
     file = getattr(sys.modules.get(kind.__module__), "__file__", None) or ""
     return os.path.relpath(file or "/", ROOT).partition(os.sep)[0] in PACKAGES
 

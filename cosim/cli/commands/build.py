@@ -88,7 +88,7 @@ def command(
     from ...core import resources
     from ...export.build import build
     from ...export.build_check import check_fmus
-    from ...export.sources import classify_source, split_reference
+    from ...export.fmu_sources import classify_source, split_reference
     from ..messages import print_log
 
     print_log()

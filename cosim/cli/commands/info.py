@@ -102,7 +102,7 @@ def command(fmu: str, with_locals: bool, as_json: bool) -> None:
 def _describe(source: str) -> tuple[Mapping[str, str], Sequence[Variable]]:
     """Return properties and variables of an FMU, a class, a Modelica model or a vehicle file."""
     from ...components.fmi import FmuFile
-    from ...export.sources import MEMBERS
+    from ...export.fmu_sources import MEMBERS
 
     file, _, name = source.rpartition(":")
     if Path(source).suffix in MEMBERS:

@@ -164,7 +164,7 @@ def _controller_names(name: str, template: Role, texts: Iterable[str]) -> dict[s
 
     Raise InputError if a language does not allow one of them.
     """
-    from ...export.sources import snake_case
+    from ...export.fmu_sources import snake_case
 
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         raise InputError(

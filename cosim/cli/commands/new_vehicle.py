@@ -187,7 +187,7 @@ def _use(file: Path, base: str, vehicle: _Vehicle, has_imported_shape: bool) -> 
 
 def _find_vehicle(base: str) -> Path:
     """Return the path of a vehicle file, given by its path or the name of a shipped vehicle."""
-    from ...export.sources import vehicle_files
+    from ...export.fmu_sources import vehicle_files
 
     if base.endswith(".json"):
         if not (path := Path(base)).is_file():

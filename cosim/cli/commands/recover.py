@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from shutil import rmtree
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import click
 
@@ -44,14 +44,14 @@ def command(output: Path) -> None:
 def _recover(unfinished: Path, target: Path, shown: Path) -> None:
     """Write the results from the rows in the folder `unfinished`, and remove it."""
     from ...process.run_files import read_metadata
-    from ...results import Result
+    from ...results import Result, RunMetadata
     from ...results.result import write_run
 
     recording, count = _read_recording(unfinished)
     metadata = read_metadata(unfinished)
     kpis, timing = metadata.pop("kpis", {}), metadata.pop("timing", {})
     metadata.setdefault("failure", "killed")
-    result = Result(recording, kpis, timing, metadata)
+    result = Result(recording, kpis, timing, cast(RunMetadata, metadata))
     try:
         if target.is_dir():
             write_run(result, target)

@@ -69,18 +69,18 @@ class Callee:
     attributes: str = ""
 
     def __call__(self, *arguments: ca.SX) -> ca.SX:
-        """Return the result as an expression that remains a function call in the generated C code."""
+        """Return the result as an expression that stays a function call in the C code."""
         return call_in_c(self.function, *arguments)[0]
 
 
 def call_in_c(function: ca.Function, *arguments: ca.SX) -> list[ca.SX]:
-    """Return the results of a function as expressions that remain a function call in the generated C code (no inlining)."""
+    """Return the results of a function, which is called and not inlined in the C code."""
     results: list[ca.SX] = function.call(list(arguments), False, True)
     return results
 
 
 class ElementAccess(NamedTuple):
-    """C expressions for element j of argument i and element j of result i of a function, as functions of (i, j)."""
+    """C expressions of element j of argument i and of result i, as functions of (i, j)."""
 
     argument: Callable[[int, int], str]
     result: Callable[[int, int], str]
@@ -295,10 +295,10 @@ def sum_over_rows(name: str, term: ca.Function, rows: int) -> Callee:
     """
     common, count = ca.SX.sym("common", term.size1_in(0)), ca.SX.sym("count")
     tables = [ca.SX.sym("table", rows, term.size1_in(i)) for i in range(1, term.n_in())]
-    terms = [
-        ca.if_else(count > k, term(common, *(table[k, :].T for table in tables)), 0)
-        for k in range(rows)
-    ]
+    terms = []
+    for k in range(rows):
+        row = [table[k, :].T for table in tables]
+        terms.append(ca.if_else(count > k, term(common, *row), 0))
     total = ca.Function(name, [common, count, *tables], [sum(terms)])
     access = ElementAccess(
         lambda i, j: f"in[{i + 1}][{rows * j} + first + k]" if i else f"common[{j}]",

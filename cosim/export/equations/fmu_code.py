@@ -161,9 +161,10 @@ def _start_assignments(model: ContinuousModel) -> str:
     """
     lines = []
     for kind in ("parameter", "input"):
-        values = [
-            start for v in model.variables if v.causality == kind for start in _start_values(v)
-        ]
+        values: list[float] = []
+        for variable in model.variables:
+            if variable.causality == kind:
+                values += _start_values(variable)
         lines += [
             f"    m->{kind}[{k}] = {value!r};\n" for k, value in enumerate(values) if value != 0
         ]

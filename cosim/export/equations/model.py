@@ -75,7 +75,10 @@ class ContinuousModel:
         return replace(self, derivatives=lambda *arguments: call_in_c(rate, *arguments)[0])
 
     def derived_parameter_symbols(self) -> ca.SX:
-        """Return symbols for the derived parameters, or for the parameters themselves if there are no derived ones."""
+        """Return symbols of the derived parameters.
+
+        Without derived ones they are those of the parameters themselves.
+        """
         parameters = ca.SX.sym("parameters", len(self.elements("parameter")))
         return (
             ca.SX.sym("constants", self.derived_parameters(parameters).numel())
@@ -105,12 +108,11 @@ class ContinuousModel:
 
     def elements(self, causality: str) -> list[Variable]:
         """Return the variables of a causality, each repeated for every element of its array."""
-        return [
-            variable
-            for variable in self.variables
-            if variable.causality == causality
-            for _ in variable.scalar_names
-        ]
+        elements: list[Variable] = []
+        for variable in self.variables:
+            if variable.causality == causality:
+                elements += [variable] * len(variable.scalar_names)
+        return elements
 
     def boolean_outputs(self) -> list[bool]:
         """Return for each element of the output vector whether it is Boolean."""
@@ -144,7 +146,7 @@ def static_model(
 
 
 def runge_kutta_4(rate: Callable[[ca.SX], ca.SX], state: ca.SX, step: ca.SX) -> ca.SX:
-    """Return the state after one step of the classical Runge-Kutta method of order 4 for x' = rate(x)."""
+    """Return the state after a step of the Runge-Kutta method of order 4 for x' = rate(x)."""
     k1 = rate(state)
     k2 = rate(state + step / 2 * k1)
     k3 = rate(state + step / 2 * k2)

@@ -16,8 +16,8 @@ from ...core.errors import InputError
 from ...results.files import writing_atomically
 from .block import Block
 from .compiler import compile_library
-from .interface import c_variable_table, check_block
-from .model_description import build_description_xml, model_description_xml
+from .description_xml import build_description_xml, model_description_xml
+from .variable_table import c_variable_table, check_block
 
 SHELL_FOLDER = Path(__file__).parents[1] / "shell"
 _SHELL_FILES = {2: ("fmi2.c", "common.h", "export.h"), 3: ("fmi3.c", "common.h", "export.h")}

@@ -9,7 +9,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from ...core.errors import InputError, Problem, did_you_mean
-from ..fmu.model_description import DESCRIPTION_FILE, validate_description
+from ..fmu.description_xml import DESCRIPTION_FILE, validate_description
 from ..fmu.package import compile_binary, fmi_headers, write_archive
 
 

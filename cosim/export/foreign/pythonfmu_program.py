@@ -18,7 +18,7 @@ from types import ModuleType
 from pythonfmu import Fmi2Slave
 from pythonfmu.builder import FmuBuilder, get_model_class
 
-#: entry of the FMU; it makes its folder a package (see `python_class`)
+#: entry of the FMU; it makes its folder a package (see `pythonfmu_export`)
 _ENTRY = """\
 \"\"\"Entry of the FMU, written by cosim: its folder as a package, and the class with a \
 log of its exceptions.\"\"\"

@@ -10,7 +10,7 @@ generated here.
 - `reader` (`expression_reader`, `statement_reader`): convert its JSON to the flat model
 - `constants`: structural parameters, constants and Strings become literals; `folded_branches`: find
   the parameters with which rumoca has selected equations
-- `messages`, `class_search`: messages of rumoca with places
+- `rumoca_messages`, `class_search`: messages of rumoca with places
 
 `model/`: the flat model
 
@@ -25,14 +25,14 @@ generated here.
 - `hybrid`: variables for pre(), relations and delay() in models with event iteration
 - `continuous_equations`: solve the equations that have a variable alone on one side, and all others
   with `equation_systems` (`scalar_equations`, `matching`)
-- `schedule` (`dependency_graph`, `when_conditions`): the order of computation
+- `computation_order` (`dependency_graph`, `when_conditions`): the order of computation
 - `analysed_model`: the result, with roles and default values of parameters
 
 `c_code/`: from the analysed model to C
 
 - `model_code` (`hybrid_code`, `model_step`, `exchange_code`): model.c; `header`: model.h
-- `functions`, `statements`, `expressions`, `builtin_functions`, `lowering`, `c_values`: parts of
-  model.c
+- `function_lowering`, `statement_lowering`, `expression_lowering`, `builtin_lowering`, `lowering`,
+  `c_values`: parts of model.c
 
 `external/`: C code of external functions
 

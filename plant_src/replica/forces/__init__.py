@@ -27,7 +27,7 @@ VESSEL_INPUTS = (
 
 
 def planar_velocity(motion: ca.SX) -> ca.SX:
-    """Return surge u, sway v (m/s, body frame) and yaw rate r (rad/s) from the inputs `VESSEL_INPUTS`."""
+    """Return surge u, sway v (m/s) and yaw rate r (rad/s) from `VESSEL_INPUTS`."""
     x, y, rate, yaw = ca.vertsplit(motion)
     return ca.vertcat(ca.cos(yaw) * x + ca.sin(yaw) * y, ca.cos(yaw) * y - ca.sin(yaw) * x, rate)
 

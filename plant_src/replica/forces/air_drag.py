@@ -1,4 +1,7 @@
-"""Drag of still air, added to the load of the water, because the plant has one input for both (equation 10 of the paper)."""
+"""Drag of still air, added to the load of the water.
+
+The plant has one input for both (equation 10 of the paper).
+"""
 
 from __future__ import annotations
 

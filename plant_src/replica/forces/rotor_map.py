@@ -1,4 +1,7 @@
-"""Rotor map: thrust T = CT w^2 and torque Q = CD w^2 of each rotor, whose speed w follows the throttle without delay."""
+"""Rotor map: thrust T = CT w^2 and torque Q = CD w^2 of each rotor.
+
+The speed w follows the throttle without delay.
+"""
 
 from __future__ import annotations
 

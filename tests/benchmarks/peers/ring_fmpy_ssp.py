@@ -9,10 +9,12 @@ from fmpy.ssp.simulation import simulate_ssp
 
 SYSTEM = """<?xml version="1.0" encoding="UTF-8"?>
 <ssd:SystemStructureDescription xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"
- xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" version="1.0" name="ring"><ssd:System name="ring">
+ xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" version="1.0" name="ring">
+<ssd:System name="ring">
 <ssd:Elements>{components}</ssd:Elements><ssd:Connections>{connections}</ssd:Connections>
 </ssd:System></ssd:SystemStructureDescription>"""
-COMPONENT = """<ssd:Component name="{}" type="application/x-fmu-sharedlibrary" source="resources/Lag.fmu"><ssd:Connectors>
+COMPONENT = """<ssd:Component name="{}" type="application/x-fmu-sharedlibrary"
+ source="resources/Lag.fmu"><ssd:Connectors>
 <ssd:Connector name="u1" kind="input"><ssc:Real/></ssd:Connector>
 <ssd:Connector name="y1" kind="output"><ssc:Real/></ssd:Connector>
 </ssd:Connectors></ssd:Component>"""

@@ -17,11 +17,13 @@ from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
 from libcosimpy.CosimObserver import CosimObserver
 
 SYSTEM = """<?xml version="1.0" encoding="utf-8" ?>
-<OspSystemStructure xmlns="http://opensimulationplatform.com/MSMI/OSPSystemStructure" version="0.1"><StartTime>0.0</StartTime>
+<OspSystemStructure xmlns="http://opensimulationplatform.com/MSMI/OSPSystemStructure" version="0.1">
+<StartTime>0.0</StartTime>
 <BaseStepSize>{step}</BaseStepSize><Algorithm>fixedStep</Algorithm><Simulators>{simulators}</Simulators>
 <Connections>{connections}</Connections></OspSystemStructure>"""
 SIMULATOR = '<Simulator name="{}" source="Lag.fmu"/>'
-CONNECTION = """<VariableConnection><Variable simulator="{}" name="y1"/><Variable simulator="{}" name="u1"/></VariableConnection>"""
+CONNECTION = """<VariableConnection><Variable simulator="{}" name="y1"/>
+<Variable simulator="{}" name="u1"/></VariableConnection>"""
 
 
 def run(ring: Ring) -> Outcome:

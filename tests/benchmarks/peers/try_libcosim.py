@@ -12,7 +12,8 @@ from libcosimpy.CosimExecution import CosimExecution
 from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
 
 SYSTEM = """<?xml version="1.0" encoding="utf-8" ?>
-<OspSystemStructure xmlns="http://opensimulationplatform.com/MSMI/OSPSystemStructure" version="0.1"><StartTime>{start}</StartTime>
+<OspSystemStructure xmlns="http://opensimulationplatform.com/MSMI/OSPSystemStructure" version="0.1">
+<StartTime>{start}</StartTime>
 <BaseStepSize>{step}</BaseStepSize><Algorithm>fixedStep</Algorithm>
 <Simulators><Simulator name="fmu" source="Model.fmu"/></Simulators></OspSystemStructure>"""
 

@@ -10,7 +10,7 @@ import pytest
 from modelica_interpreter import Interpreter, load_interpreter
 
 from cosim.core.errors import ComponentError, InputError
-from cosim.export.fmu.interface import check_block
+from cosim.export.fmu.variable_table import check_block
 from cosim.export.modelica import load_block
 
 

@@ -8,7 +8,7 @@ import pytest
 from lxml import etree
 
 from cosim.core.errors import InputError
-from cosim.export.fmu.model_description import model_description_xml
+from cosim.export.fmu.description_xml import model_description_xml
 from cosim.export.modelica import load_block
 from cosim.export.modelica.frontend import rumoca_frontend
 

@@ -153,7 +153,7 @@ def test_turbulence_has_drydens_spectrum(gusts, axis, transverse, measured: Meas
 
 
 def test_turbulence_has_drydens_deviations(gusts, measured: MeasurementCheck):
-    """At 20 ft in a wind of 5 m/s there: 0.1 W20, and that over (0.177 + 0.000823 h)^0.4 = 0.519."""
+    """At 20 ft in a wind of 5 m/s: 0.1 W20, and that over (0.177 + 0.000823 h)^0.4."""
     _, values = gusts
     level = 0.5 / (0.177 + 0.000823 * 20) ** 0.4
     deviation = values.std(axis=1)

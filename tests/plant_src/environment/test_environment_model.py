@@ -428,9 +428,11 @@ EVENTFUL = """
 {"name": "eventful", "stop_time": 3, "step_size": 0.01,
  "components": {"plant": {"python": "ROOT/plant_src/world.py:World", "arguments": {
    "vehicles": {"usv": {"model": "strider", "motion": "6dof", "position": [0, 0]}},
-   "environment": {"seed": 1, "wind": {"speed": 0}, "waves": {"significant_height": 0.2, "peak_period": 3}}}}},
+   "environment": {"seed": 1, "wind": {"speed": 0},
+    "waves": {"significant_height": 0.2, "peak_period": 3}}}}},
  "inputs": [{"file": "gain.csv", "to": {"gain": "plant.environment.wave_gain"}}],
- "events": [{"time": 1, "set": {"plant.environment.wind.x": 4}}, {"time": 2, "set": {"plant.environment.wind.x": -4}}]}
+ "events": [{"time": 1, "set": {"plant.environment.wind.x": 4}},
+  {"time": 2, "set": {"plant.environment.wind.x": -4}}]}
 """
 
 

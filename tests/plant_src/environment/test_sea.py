@@ -91,7 +91,7 @@ def test_jonswap_is_peaked_by_gamma():
 
 @pytest.mark.parametrize("seed", range(5))
 def test_amplitudes_hold_the_energy_between_the_cuts(seed, measured: MeasurementCheck):
-    """The fraction of a Pierson-Moskowitz sea below r times the peak frequency is exp(-5/4 / r^4)."""
+    """The fraction of a Pierson-Moskowitz sea below r peak frequencies is exp(-5/4 / r^4)."""
     part = math.exp(-1.25 / 4**4) - math.exp(-1.25 / 0.5**4)
     waves = realisation(seed, **SWELL)
     m0 = (waves.amplitude**2 / 2).sum()
@@ -227,7 +227,7 @@ def test_sea_states_are_those_of_the_wmo(state):
 
 
 def test_a_sea_state_is_fully_developed():
-    """The peak of a Pierson-Moskowitz sea: wp = 0.877 g / V with Hs = 0.21 V^2 / g (Fossen 2021)."""
+    """The peak of a Pierson-Moskowitz sea: wp = 0.877 g / V, Hs = 0.21 V^2 / g (Fossen)."""
     speed = math.sqrt(9.81 * 1.875 / 0.21)
     assert fully_developed_period(1.875) == pytest.approx(
         2 * math.pi / (0.877 * 9.81 / speed), rel=0.01

@@ -27,7 +27,7 @@ PLATFORM = Platform("start", (2.0, 1.0, 0.5), (5.0, 0.0, 1.0))
 
 
 def vessel(centre: Any, attitude: Rotation) -> Any:
-    """A vessel that publishes this deck centre and attitude, as the contact bodies of a world do."""
+    """A vessel that publishes this deck centre and attitude, as contact bodies do."""
     slots = STRIDER.slots("output")
     outputs = np.zeros(len(slots))
     x, y, z, w = attitude.as_quat()
@@ -193,7 +193,7 @@ def test_the_water_level_is_that_at_the_centre_of_mass_near_the_crests() -> None
 
 @pytest.mark.parametrize("platforms", [[], [PLATFORM]], ids=["water", "platform"])
 def test_the_c_code_and_its_casadi_function_agree(platforms: list[Platform]) -> None:
-    """Both forms at random attitudes above, beside and below a platform, in waves and above them."""
+    """Both forms at random attitudes above, beside and below a platform and waves."""
     function, _ = create_surroundings_function()
     random, below = (
         np.random.default_rng(5),

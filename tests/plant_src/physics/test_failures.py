@@ -106,7 +106,7 @@ def test_a_quadcopter_below_the_still_water_is_ditched_for_good(
 
 
 def test_a_quadcopter_is_ditched_by_the_wave_at_its_place() -> None:
-    """Hold a quadcopter below the highest crests: it is ditched by the first crest that reaches it."""
+    """Hold a quadcopter below the highest crests: the first crest that reaches it ditches it."""
     waves = {"spectrum": "jonswap", "significant_height": 1.0, "peak_period": 4.0, "components": 16}
     height = 0.3
     vehicles = {"uav": quadcopter_settings([0.0, 0.0, height])}

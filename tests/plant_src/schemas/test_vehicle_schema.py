@@ -1,4 +1,4 @@
-"""JSON Schema of vehicle files: it accepts what the readers accept, and requires what they require."""
+"""JSON Schema of vehicle files: it accepts and requires what the readers do."""
 
 from __future__ import annotations
 

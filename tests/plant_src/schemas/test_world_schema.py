@@ -1,4 +1,4 @@
-"""JSON Schema of the arguments of a world: its keys, examples and defaults are those of the reader."""
+"""JSON Schema of the arguments of a world: keys, examples and defaults of the reader."""
 
 from __future__ import annotations
 

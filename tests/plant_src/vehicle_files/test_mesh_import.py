@@ -123,7 +123,8 @@ def test_meshes_of_a_urdf_file_collide_and_are_shown(tmp_path: Path) -> None:
         'scale="1 1 1"/></geometry>'
     )
     (tmp_path / "boat.urdf").write_text(
-        f'<robot name="boat"><link name="hull">{inertial}<visual>{geometry}</visual><collision>{geometry}</collision></link>'
+        f'<robot name="boat"><link name="hull">{inertial}<visual>{geometry}</visual>'
+        f"<collision>{geometry}</collision></link>"
         '<link name="port"/><joint name="shaft" type="fixed"><parent link="hull"/><child '
         'link="port"/>'
         '<origin xyz="-0.9 0.395 -0.1"/></joint>'

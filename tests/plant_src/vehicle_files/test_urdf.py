@@ -28,7 +28,8 @@ PAGE = Path(__file__).parents[3] / "plant_src/vehicles/data/README.md"
 DATA: dict[str, Any] = json.loads(EXAMPLE)
 BODY = """<link name="base"><inertial><origin xyz="0 0 0.02" rpy="0 0 0.5"/><mass value="0.8"/>
   <inertia ixx="0.004" iyy="0.005" izz="0.008" ixy="0.0002" ixz="0" iyz="0"/></inertial>
-  <collision><origin rpy="0 0 0.3"/><geometry><box size="0.2 0.1 0.06"/></geometry></collision></link>"""
+  <collision><origin rpy="0 0 0.3"/><geometry><box size="0.2 0.1 0.06"/></geometry></collision>\
+</link>"""
 
 
 def robot(body: str = BODY, shape: str = '<cylinder radius="0.01" length="0.04"/>') -> str:

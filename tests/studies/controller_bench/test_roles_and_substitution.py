@@ -42,7 +42,9 @@ class Bare(Fmi2Slave):
     def __init__(self, **arguments):
         super().__init__(**arguments)
         for i in range(1, 5):
-            self.register_variable(Real(f"rotor_speed[{i}]", causality=Fmi2Causality.output, getter=lambda: 0.0))
+            name = f"rotor_speed[{i}]"
+            rotor = Real(name, causality=Fmi2Causality.output, getter=lambda: 0.0)
+            self.register_variable(rotor)
 
     def do_step(self, current_time, step_size):
         return True
@@ -175,7 +177,7 @@ def test_ports_without_a_target_are_removed_with_their_settings(tmp_path):
 
 
 def test_a_parameter_of_the_role_may_be_declared_without_its_prefix(tmp_path):
-    """A scenario sets it in the controller, through a port of the system around it, or not at all."""
+    """A scenario sets it in the controller, through a port of its system, or not at all."""
     role, candidate = (
         read_role("uav_controller"),
         parse_source(str(min(read_role("uav_controller").controllers))),

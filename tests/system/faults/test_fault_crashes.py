@@ -24,7 +24,7 @@ DEADLINES, SLACK = {"load": 0.5, "initialization": 0.5, "step": 0.5, "end": 0.5}
 
 @dataclass(frozen=True)
 class Case:
-    """An order, words of the message ({f}: the C function), exit code, and the rows that are kept."""
+    """An order, words of the message ({f}: the C function), exit code, and the kept rows."""
 
     order: str
     words: str = ""

@@ -15,7 +15,7 @@ T8 = " failed at t = 0.08 s: "
 
 @dataclass(frozen=True)
 class Case:
-    """An order, words of the message ({f}: the C function), exit code, and the rows that are kept."""
+    """An order, words of the message ({f}: the C function), exit code, and the kept rows."""
 
     order: str
     words: str

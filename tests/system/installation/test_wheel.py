@@ -1,4 +1,4 @@
-"""cosim from a wheel in an environment of its own, in which the plant is a package like any other."""
+"""cosim from a wheel in its own environment, where the plant is a package like any other."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ def entries(folder: str) -> int:
 
 
 def measure_runs(scenario: str, count: int) -> list[dict[str, int]]:
-    """After the first runs, in which caches and memory pools fill, and after as many as asked for."""
+    """After the first runs, in which caches and memory pools fill, and after many more."""
     looks, first = [], max(10, min(50, count))
     for n in range(1, first + count + 1):
         cosim.run(scenario, NO_OUTPUTS | {"/record": {"signals": ["*"]}}, stop_time=0.05)

@@ -1,4 +1,4 @@
-"""`cosim recover` with damaged files: kept rows are never deleted before their results are written."""
+"""`cosim recover` with damaged files: kept rows stay until their results are written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Killed at any moment, a run has lost no row, and what it leaves can be recovered and goes away."""
+"""A killed run loses no row; what it leaves can be recovered and then goes away."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The same scenario gives the same bytes, whatever surrounds it; and the numbers that others get."""
+"""The same scenario gives the same bytes in every environment, and the numbers of others."""
 
 from __future__ import annotations
 

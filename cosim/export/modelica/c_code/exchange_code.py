@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 
 from ..model.flat_model import Model, Relation, is_integrated
 from .c_values import function_definition
-from .statements import StatementLowering
+from .statement_lowering import StatementLowering
 
 #: distance from a crossing at which its indicator changes its sign, so that the relation has
 #: changed when the event is executed

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..causality.analysed_model import ParameterRoles
-from ..causality.schedule import Schedule
+from ..causality.computation_order import Schedule
 from ..model.flat_model import Model, Variable, derivative_name, is_input, is_integrated
 from ..model.traversal import composed_asserts, has_terminate
 from .c_values import C_TYPES, CValue, c_identifier, variable_value

@@ -28,7 +28,7 @@ from ..model.syntax_tree import Assign, Name
 from .c_values import C_TYPES, CExpression, CValue, function_definition, scalar_value
 from .model_code import ModelCode
 from .model_step import hybrid_step_body
-from .statements import StatementLowering
+from .statement_lowering import StatementLowering
 
 
 @dataclass

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..causality.analysed_model import AnalysedModel
-from ..causality.schedule import finite_variables, pre_variables, start_value
+from ..causality.computation_order import finite_variables, pre_variables, start_value
 from ..model.flat_model import Variable, derivative_name, is_input, owning_component
 from ..model.syntax_tree import Body, Name, Solve, SourceLocation, Statement, referenced_variable
 from ..model.traversal import assigned_references, walk
@@ -24,10 +24,10 @@ from .c_values import (
     uses_variable,
 )
 from .exchange_code import exchange_functions, has_exchange, indicator_lines
-from .functions import FunctionTranslator
+from .function_lowering import FunctionTranslator
 from .header import has_messages, struct_member, struct_members
 from .model_step import continuous_step_body, sampled_step_body
-from .statements import StatementLowering
+from .statement_lowering import StatementLowering
 
 #: failure reasons of runtime.h, in the order of its enumeration (from 1)
 _STANDARD_REASONS = (

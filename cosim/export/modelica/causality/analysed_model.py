@@ -11,7 +11,7 @@ from ..model.evaluate import Evaluator, convert_to_type
 from ..model.flat_model import Model, Variable, is_input
 from ..model.syntax_tree import raise_model_error
 from ..model.traversal import variable_names
-from .schedule import Schedule, build_schedule, declared_value, start_value
+from .computation_order import Schedule, build_schedule, declared_value, start_value
 
 
 @dataclass(frozen=True)

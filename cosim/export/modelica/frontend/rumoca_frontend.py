@@ -23,7 +23,6 @@ from ....core.errors import CosimError, InputError, Problem, did_you_mean, write
 from ....core.resources import cache_directory
 from ....results.files import writing_atomically
 from .libraries import Library, find_libraries, library_folders
-from .messages import to_problems, to_syntax_problem
 from .model_files import (
     ModelicaSources,
     _is_member,
@@ -36,6 +35,7 @@ from .model_files import (
     select_used_files,
 )
 from .rumoca_client import run_rumoca
+from .rumoca_messages import to_problems, to_syntax_problem
 
 RUMOCA_VERSION = "0.10.2"
 

@@ -13,7 +13,7 @@ from bad_fmus import find_problems, members, pack_archive, refusal_message
 
 from cosim.components.fmi import FmuFile
 from cosim.core.errors import InputError
-from cosim.export.fmu.model_description import validate_description
+from cosim.export.fmu.description_xml import validate_description
 
 HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
 LAUGHS = "".join(f'<!ENTITY l{i + 1} "{f"&l{i};" * 10}">' for i in range(9))

@@ -15,10 +15,10 @@ from ..core import resources
 from ..core.errors import CosimError, InputError, Problem
 from .fmu.block import Block
 from .fmu.compiler import compiler_version, find_compiler
-from .fmu.model_description import DESCRIPTION_FILE
+from .fmu.description_xml import DESCRIPTION_FILE
 from .fmu.package import write_fmu
 from .foreign.c_sources import write_c_fmu
-from .foreign.python_class import write_python_fmu
+from .foreign.pythonfmu_export import write_python_fmu
 from .plant import VEHICLE_PROGRAM, vehicle_block
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from zipfile import ZipFile
 
 from ...components.python_import import read_with_relative_imports, with_imported_siblings
 from ...core.errors import InputError, Problem
-from ..fmu.model_description import (
+from ..fmu.description_xml import (
     DESCRIPTION_FILE,
     Element,
     add_units,

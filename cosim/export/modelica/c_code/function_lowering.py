@@ -22,7 +22,7 @@ from ..model.syntax_tree import (
 from ..model.traversal import read_references, rewrite, variable_names, walk
 from .c_values import C_TYPES, CValue, c_identifier, uses_variable, variable_value, wrap_lines
 from .lowering import FunctionInstance
-from .statements import StatementLowering
+from .statement_lowering import StatementLowering
 
 Shapes = tuple[tuple[int, ...], ...]
 Sizes = tuple[tuple[str, int], ...]

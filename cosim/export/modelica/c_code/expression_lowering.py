@@ -25,7 +25,7 @@ from ..model.syntax_tree import (
     raise_model_error,
 )
 from ..model.traversal import unroll
-from .builtin_functions import BuiltinLowering
+from .builtin_lowering import BuiltinLowering
 from .c_values import (
     CExpression,
     CValue,

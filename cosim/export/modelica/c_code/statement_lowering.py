@@ -34,7 +34,7 @@ from ..model.traversal import (
     variable_names,
 )
 from .c_values import CExpression, CValue, c_identifier, scalar_value
-from .expressions import ExpressionLowering
+from .expression_lowering import ExpressionLowering
 
 _MAX_CONDITIONAL_LENGTH = 90
 

@@ -13,7 +13,7 @@ from ...core import units
 from ...core.errors import InputError, Problem
 from ...core.units import BASE_UNITS
 from .block import Block, BlockVariable
-from .interface import TableRow, start_values, variable_table
+from .variable_table import TableRow, start_values, variable_table
 
 Element = ElementTree.Element
 ERROR_LOG_CATEGORY = {"name": "logStatusError", "description": "why a call failed"}
