@@ -9,11 +9,13 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
+from types import ModuleType
 from typing import Any, TypeVar
 
 from cosim.core.errors import InputError, Problem, did_you_mean
 
-from .vehicles.common.vehicle_reader import read_visual
+from .vehicles.common.shapes import Body, inertia_of
+from .vehicles.common.vehicle_reader import VehicleData, read_visual
 from .vehicles.data import FOLDER
 from .vehicles.model import Model
 
@@ -29,103 +31,94 @@ COMMON_KEYS = ("family", "name", "description", "sources", "validity", "visual",
 #: vehicles that are given by a file, whose name is that of the vehicle
 _FILES = {file.stem: file for file in sorted(FOLDER.glob("*.json"))}
 
+
+def _model(
+    name: str,
+    family: str,
+    vehicle: VehicleData[Any],
+    interface: ModuleType,
+    slots: int | tuple[int, int],
+    **kind: Any,
+) -> Model:
+    """Return the model of a vehicle that is given by data.
+
+    Args:
+        name: Name of the vehicle.
+        family: Family of equations, the name of their FMU.
+        vehicle: Its data.
+        interface: Module with the variables and states of the family.
+        slots: Number of elements of the arrays of actuators in the compiled equations, or the
+            numbers of propellers and rudders.
+        **kind: Further arguments of the model.
+    """
+
+    def body_of(given: Mapping[str, float]) -> Body:
+        if "yaw_inertia" in given:
+            return vehicle.body(mass=given["mass"], yaw_inertia=given["yaw_inertia"])
+        return vehicle.body(mass=given["mass"], inertia=inertia_of(given))
+
+    return Model(
+        name,
+        interface.variables(vehicle.vehicle),
+        interface.states(slots if isinstance(slots, int) else slots[0]),
+        vehicle.body(),
+        vehicle.crash_speed,
+        body_of=body_of,
+        equations=family,
+        layout=interface.variables(vehicle.vehicle, slots),
+        **kind,
+    )
+
+
 # Builders import the modules of their vehicles themselves: a run needs few of them.
 
 
-def multirotor_model(name: str, data: Mapping[str, Any]) -> Model:
-    """Return the model of a multirotor. Raises InputError with all problems of its data."""
-    from .vehicles.common.shapes import inertia_of
+def _multirotor(name: str, data: Mapping[str, Any]) -> Model:
     from .vehicles.multirotor import interface
     from .vehicles.multirotor.airframe import MAX_ROTORS, MultirotorReader
 
-    vehicle = MultirotorReader().read(name, data, COMMON_KEYS)
-    airframe = vehicle.vehicle
-    return Model(
-        name,
-        interface.variables(airframe),
-        interface.states(MAX_ROTORS),
-        vehicle.body(),
-        vehicle.crash_speed,
-        airframe=airframe,
-        body_of=lambda given: vehicle.body(mass=given["mass"], inertia=inertia_of(given)),
-        equations="multirotor",
-        layout=interface.variables(airframe, MAX_ROTORS),
-    )
+    given = MultirotorReader().read(name, data, COMMON_KEYS)
+    return _model(name, "multirotor", given, interface, MAX_ROTORS, airframe=given.vehicle)
 
 
-def submerged_model(name: str, data: Mapping[str, Any]) -> Model:
-    """Return the model of a submerged vehicle. Raises InputError with all problems of its data."""
-    from .vehicles.common.shapes import inertia_of
+def _submerged(name: str, data: Mapping[str, Any]) -> Model:
     from .vehicles.submerged import interface
     from .vehicles.submerged.craft import MAX_THRUSTERS, SubmergedReader
 
-    vehicle = SubmergedReader().read(name, data, COMMON_KEYS)
-    craft = vehicle.vehicle
-    return Model(
-        name,
-        interface.variables(craft),
-        interface.states(MAX_THRUSTERS),
-        vehicle.body(),
-        vehicle.crash_speed,
-        craft=craft,
-        body_of=lambda given: vehicle.body(mass=given["mass"], inertia=inertia_of(given)),
-        equations="submerged",
-        layout=interface.variables(craft, MAX_THRUSTERS),
-    )
+    given = SubmergedReader().read(name, data, COMMON_KEYS)
+    return _model(name, "submerged", given, interface, MAX_THRUSTERS, craft=given.vehicle)
 
 
-def surface_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
-    """Return the model of a floating vessel. Raises InputError with all problems of its data."""
-    from .vehicles.common.shapes import inertia_of
+def _surface_vessel(name: str, data: Mapping[str, Any]) -> Model:
     from .vehicles.surface_vessel import interface
     from .vehicles.surface_vessel.surface_vessel import SurfaceVesselReader
     from .vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
 
-    vehicle = SurfaceVesselReader().read(name, data, COMMON_KEYS)
-    vessel = vehicle.vehicle
-    return Model(
-        name,
-        interface.variables(vessel),
-        interface.states(MAX_PROPELLERS),
-        vehicle.body(),
-        vehicle.crash_speed,
-        is_vessel=True,
-        boat=vessel,
-        body_of=lambda given: vehicle.body(mass=given["mass"], inertia=inertia_of(given)),
-        equations="surface_vessel",
-        layout=interface.variables(vessel, (MAX_PROPELLERS, MAX_RUDDERS)),
+    given, slots = (
+        SurfaceVesselReader().read(name, data, COMMON_KEYS),
+        (MAX_PROPELLERS, MAX_RUDDERS),
     )
+    kind = {"is_vessel": True, "boat": given.vehicle}
+    return _model(name, "surface_vessel", given, interface, slots, **kind)
 
 
-def planar_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
-    """Return the model of a planar vessel. Raises InputError with all problems of its data."""
+def _planar_vessel(name: str, data: Mapping[str, Any]) -> Model:
     from .vehicles.planar_vessel import interface
     from .vehicles.planar_vessel.planar_vessel import PlanarVesselReader
     from .vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
 
-    vehicle = PlanarVesselReader().read(name, data, COMMON_KEYS)
-    vessel = vehicle.vehicle
-    return Model(
-        name,
-        interface.variables(vessel),
-        interface.states(MAX_PROPELLERS),
-        vehicle.body(),
-        vehicle.crash_speed,
-        is_vessel=True,
-        motion="planar",
-        boat=vessel,
-        body_of=lambda given: vehicle.body(mass=given["mass"], yaw_inertia=given["yaw_inertia"]),
-        equations="planar_vessel",
-        layout=interface.variables(vessel, (MAX_PROPELLERS, MAX_RUDDERS)),
-    )
+    given, slots = PlanarVesselReader().read(name, data, COMMON_KEYS), (MAX_PROPELLERS, MAX_RUDDERS)
+    kind = {"is_vessel": True, "motion": "planar", "boat": given.vehicle}
+    return _model(name, "planar_vessel", given, interface, slots, **kind)
 
 
-#: family of equations -> function from name and data to the model
+#: family of equations -> function from name and data to the model, which raises InputError with all
+#: problems of the data
 FAMILIES = {
-    "multirotor": multirotor_model,
-    "submerged": submerged_model,
-    "surface_vessel": surface_vessel_model,
-    "planar_vessel": planar_vessel_model,
+    "multirotor": _multirotor,
+    "submerged": _submerged,
+    "surface_vessel": _surface_vessel,
+    "planar_vessel": _planar_vessel,
 }
 
 
@@ -157,7 +150,8 @@ def model_from_data(data: Mapping[str, Any], name: str = "") -> Model:
 def _named_links(data: Mapping[str, Any]) -> Iterator[Problem]:
     """Yield a problem for each actuator whose place is a link of a URDF file."""
     for key in NAMED_LISTS:
-        for i, element in enumerate(found if isinstance(found := data.get(key), list) else []):
+        found = data.get(key)
+        for i, element in enumerate(found if isinstance(found, list) else []):
             if isinstance(element, Mapping) and "link" in element:
                 text = (
                     f"found the link {element['link']!r}: `cosim new vehicle --urdf FILE` replaces "

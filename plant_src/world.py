@@ -25,8 +25,7 @@ from .environment.environment_model import EnvironmentModel
 from .physics.body import ContactBody, InvalidStateError
 from .physics.bullet import connect, create_fixed_bodies, preconnect, pybullet
 from .physics.compiled_equations import library_path
-from .physics.contacts import overlap_depths
-from .physics.failures import FLAG_COUNT
+from .physics.contacts import FLAG_COUNT, overlap_depths
 from .physics.fleet import Fleet, FleetState
 from .variable_views import recorded_others, variable_views, views_in_parts
 from .vehicle_files.plausibility import placement_warnings

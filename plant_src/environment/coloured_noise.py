@@ -41,7 +41,7 @@ BLOCK_LENGTH = 256
 class Channel:
     """Noise with a standard deviation, a time constant T (s) and a lead b.
 
-    B = 1 gives a first-order filter.
+    With b = 1 the filter is of first order.
     """
 
     deviation: float
@@ -68,6 +68,9 @@ class ColouredNoise:
         filters = [(c.deviation, c.time_constant, c.lead) for c in channels] * len(names)
         deviation, time_constant, lead = np.array(filters).T[:, :, None]
         p = deviation**2 / (lead**2 + (1 - lead) ** 2 / 2 + lead * (1 - lead))
+        # Exact discretisation (Van Loan): a step multiplies the states x1, x2 by the matrix
+        # exponential, and noise with the covariance P - propagated P keeps P stationary. The
+        # Cholesky factor of that covariance makes such a noise from two white ones.
         self._g = g = GRID_STEP / time_constant
         self._a = a = np.exp(-g)
         self._lead = lead
@@ -97,6 +100,8 @@ class ColouredNoise:
 
     def _compute(self, number: int) -> None:
         """Compute one block, whose start states must be known."""
+        # White noise follows from seed, name and block number, so a block is repeated at any time
+        # from the states at its start, of which all computed blocks keep two numbers.
         n1, n2 = _correlated(self._noise_root, self._white_noise((str(number),), BLOCK_LENGTH))
         start1, start2 = self._block_start_states[number]
         x1 = _first_order_recursion(self._a, start1, n1)

@@ -217,6 +217,9 @@ def _stratified_samples(
 
     The samples are in ascending order; the area is the total one.
     """
+    # Inverse transform sampling: the samples are where the area below the density reaches quantiles
+    # of its total. One quantile is drawn from each of `count` equal parts of 0 ... 1 (stratified),
+    # so every realisation has components in all parts of the spectrum.
     cumulative = np.concatenate(
         [[0.0], np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(grid))]
     )

@@ -90,6 +90,9 @@ class Clearance:
         self.near_pairs = [
             (one, other) for one, other in np.argwhere(np.triu(near[:, :, 0], 1)).tolist()
         ]
+        # Two boxes stay apart as long as they are apart along one axis. So only the axis with the
+        # largest gap limits the motion: until two vehicles have used half of that gap each, they
+        # cannot meet, however they move along the other axes.
         limits = np.where(
             (gaps < largest_gap) | near, math.inf, (gaps - NEAR_DISTANCE) * self._gap_fraction
         )
@@ -113,6 +116,7 @@ class Clearance:
 
     def _gap(self, vehicle: int, other: int) -> float:
         """Return the largest gap along an axis (m) of a vehicle to another one or a platform."""
+        # plain numbers: `is_valid` examines few pairs in each step, where NumPy takes longer
         a, b = self._swept_box(vehicle), self._swept_box(other)
         return max(a[0] - b[3], b[0] - a[3], a[1] - b[4], b[1] - a[4], a[2] - b[5], b[2] - a[5])
 

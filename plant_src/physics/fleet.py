@@ -20,8 +20,7 @@ from .body import ContactBody, InvalidStateError, PlanarBody, body_class, state_
 from .bullet import pybullet
 from .clearance import BoundingBox, Clearance
 from .compiled_equations import CompiledEquations
-from .contacts import ContactMemory, Contacts, touching_pairs
-from .failures import Failures
+from .contacts import ContactMemory, Contacts, Failures, touching_pairs
 
 
 class VehicleArrays:
@@ -89,7 +88,7 @@ class Fleet:
         vehicles: Vehicles to create.
         fixed: Bounding boxes of platforms and obstacles, which exist in Bullet already.
         step_size: Duration of a step (s), shape (1,); the owner may change it between steps.
-        flags: Flags of each vehicle (`failures.py`), shape (vehicles, FLAG_COUNT).
+        flags: Flags of each vehicle (`contacts.Failures`), shape (vehicles, FLAG_COUNT).
         fixed_names: Name of each platform and obstacle by its number in Bullet.
 
     Attributes:

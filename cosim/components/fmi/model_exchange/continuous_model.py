@@ -60,6 +60,7 @@ class Integrator(Protocol):
 
     def inputs_changed(self) -> None:
         """Take into account that the inputs of the next step are not those of the last one."""
+        return
 
     def take_event(self) -> StepEvent:
         """Return the event at which the last call stopped.

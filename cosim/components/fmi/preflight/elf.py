@@ -223,6 +223,9 @@ class _ElfReader:
 
     def _gnu_symbol_count(self, offset: int) -> int:
         """Return one more than the largest symbol index in the chains of a GNU hash table."""
+        # The table has no number of symbols. Each bucket holds the first symbol of a chain, and the
+        # chain ends with a hash whose lowest bit is set: the end of the chain with the largest first
+        # symbol is the last symbol.
         nbuckets, symoffset, bloom_size, _ = self.unpack("4L", offset)
         if nbuckets > _MAX_SYMBOLS or bloom_size > _MAX_SYMBOLS:
             raise InvalidLibraryError(f"is damaged: it claims {nbuckets} hash buckets")
