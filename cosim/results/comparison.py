@@ -20,9 +20,7 @@ from .tolerance_tube import (
     TimeWindows,
     Tolerance,
     Tube,
-    UniformTimeWindows,
     time_tolerance,
-    uniform_spacing,
 )
 
 #: share of all points up to which it is faster to compute the tube only at these points
@@ -176,20 +174,8 @@ class Comparer:
         rows: slice | np.ndarray = slice(None),
     ) -> Tube:
         time = self.points.time[rows]
-        if self._spacing and isinstance(rows, slice):
-            lower, upper = UniformTimeWindows(self._spacing, reach).extremes(reference)
-        else:
-            lower, upper = TimeWindows(self._reference.time, time, reach).extremes(reference)
+        lower, upper = TimeWindows(self._reference.time, time, reach).extremes(reference)
         return Tube(time, lower - half_width, upper + half_width)
-
-    @cached_property
-    def _spacing(self) -> float:
-        """Distance between points (s) if they are evenly spaced rows of the reference, else 0."""
-        return (
-            uniform_spacing(self.points.time)
-            if np.array_equal(self.points.time, self._reference.time)
-            else 0.0
-        )
 
     def _half_width(self, name: str, tolerance: Tolerance) -> float:
         return tolerance.half_width(_to_floats(self._reference, name))

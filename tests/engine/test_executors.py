@@ -17,7 +17,7 @@ from cosim.core.system import FLOAT_TYPES, Connection, Endpoint, Group, System, 
 from cosim.core.time_grid import exact_fraction
 from cosim.core.units import parse_unit
 from cosim.engine import EXECUTORS, native_available, parallel
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 from cosim.engine.thread_pool import ThreadPool
 from cosim.process import journal

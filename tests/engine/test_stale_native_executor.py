@@ -16,7 +16,7 @@ from systems import make_system
 from cosim.cli import CommandLine, cli, run_guarded
 from cosim.core.errors import InputError
 from cosim.engine import executor_class, native_available, native_executor
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 from cosim.export.fmu.compiler import find_compiler
 

@@ -14,8 +14,7 @@ from cosim.core.component import StepResult, Variable
 from cosim.core.expressions import parse_condition
 from cosim.core.time_grid import exact_fraction
 from cosim.engine import EXECUTORS, compile_plan
-from cosim.engine.plan_run import PlanRun, SimulationOutcome
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import PlanRun, SimulationOutcome, simulate
 from cosim.engine.settings import Event, Settings, StopCondition
 
 
