@@ -9,7 +9,6 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
 
@@ -17,6 +16,7 @@ from cosim.core.errors import InputError, Problem, did_you_mean
 
 from .vehicles.common.shapes import Body, inertia_of
 from .vehicles.common.vehicle_reader import VehicleData, read_visual
+from .vehicles.data import FOLDER
 from .vehicles.model import Model
 
 _Value = TypeVar("_Value")
@@ -29,9 +29,7 @@ NAMED_LISTS = ("rotors", "thrusters", "propellers")
 COMMON_KEYS = ("family", "name", "description", "sources", "validity", "visual", "$schema")
 
 #: vehicles that are given by a file, whose name is that of the vehicle
-_FILES = {
-    file.stem: file for file in sorted((Path(__file__).parent / "vehicles/data").glob("*.json"))
-}
+_FILES = {file.stem: file for file in sorted(FOLDER.glob("*.json"))}
 
 
 def _model(

@@ -283,7 +283,7 @@ class Comparer:
     def _tube_violation(
         self, name: str, tube: Tube, values: np.ndarray, distance: np.ndarray, half_width: float
     ) -> Verdict:
-        """Return the verdict on a signal with a positive `distance` from the tube at some points."""
+        """Return the verdict on a signal with a positive `distance` from the tube somewhere."""
         outside = np.flatnonzero(distance > 0)
         row, worst, unit = outside[0], int(distance.argmax()), self._unit_suffix(name)
         time, excess = float(tube.time[row]), _relative_excess(distance[worst], half_width)

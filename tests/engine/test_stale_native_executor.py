@@ -56,7 +56,8 @@ def message(stale, monkeypatch):
     found, module = stale
     monkeypatch.setattr(native_executor, "_native", module)
     return (
-        f"the native executor {module.__file__} has interface {found}, expected {native_executor.INTERFACE}: "
+        f"the native executor {module.__file__} has interface {found}, expected "
+        f"{native_executor.INTERFACE}: "
         "build it again with `python setup.py build_ext --inplace` in the checkout\n"
     )
 

@@ -317,11 +317,9 @@ class FmuFile:
         """
         assert self._folder is not None
         other = copy(self)
-        other._folder, other._extracted, other._reference_count = (
-            _BorrowedFolder(self._folder.name),
-            None,
-            0,
-        )
+        other._folder = _BorrowedFolder(self._folder.name)
+        other._extracted = None
+        other._reference_count = 0
         other.library, other.has_fatal_error = None, False
         return other
 

@@ -69,10 +69,8 @@ class Worker:
             setup: Function that enters the sandbox, called before foreign code is loaded.
         """
         self._instance, self._block, self._setup = instance, block, setup
-        self._input_strings, self._output_strings = (
-            string_array(block.inputs),
-            string_array(block.outputs),
-        )
+        self._input_strings = string_array(block.inputs)
+        self._output_strings = string_array(block.outputs)
         self._calls: Sequence[
             tuple[int, Callable[..., int], tuple[Any, ...], bool, PreparedCall]
         ] = ()
@@ -105,10 +103,8 @@ class Worker:
         journals.set_current_journal(self._block.journal)
         tempfile.tempdir = os.environ["TMPDIR"] = str(temporary)
         # the importer limits number and length of the messages
-        component_log.MAX_MESSAGES_PER_SECOND, component_log.MAX_MESSAGE_LENGTH = (
-            sys.maxsize,
-            _MAX_MESSAGE_LENGTH,
-        )
+        component_log.MAX_MESSAGES_PER_SECOND = sys.maxsize
+        component_log.MAX_MESSAGE_LENGTH = _MAX_MESSAGE_LENGTH
         sender = _LineSender(answers)
         logger = logging.getLogger("cosim.component")
         logger.handlers, logger.propagate, logger.level = [sender], False, logging.INFO

@@ -222,10 +222,8 @@ class ContinuousModel:
         name = self.functions[role]
         if not len(values) or (is_optional and name not in self.library):
             return lambda: None
-        function, arguments = (
-            self.library[name],
-            (self._instance, as_pointer(values.ctypes.data), as_size(len(values))),
-        )
+        function = self.library[name]
+        arguments = (self._instance, as_pointer(values.ctypes.data), as_size(len(values)))
 
         def call() -> None:
             status = function(*arguments)

@@ -103,10 +103,8 @@ class FixedStepIntegrator(Integrator):
                 setattr(state, role, function_address(model.library[model.functions[role]]))
         state.states, state.derivatives = model.states.ctypes.data, model.derivatives.ctypes.data
         state.start_states, state.sum = self._start_states.ctypes.data, self._sum.ctypes.data
-        state.indicators, state.previous_indicators = (
-            model.indicators.ctypes.data,
-            self._previous_indicators.ctypes.data,
-        )
+        state.indicators = model.indicators.ctypes.data
+        state.previous_indicators = self._previous_indicators.ctypes.data
         inputs = model.linear_inputs
         state.reference_count, state.input_count = len(inputs.references), len(inputs.indices)
         for name in ("references", "array", "indices", "slopes", "values"):

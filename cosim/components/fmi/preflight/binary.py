@@ -141,10 +141,8 @@ def _check_library(
     except InvalidLibraryError as error:
         yield FORMAT(f"the library cannot be loaded: it {error}", member)
         return
-    called, identifier = (
-        called_functions(model, interface),
-        model.interfaces[interface]["modelIdentifier"],
-    )
+    called = called_functions(model, interface)
+    identifier = model.interfaces[interface]["modelIdentifier"]
     if missing := sorted(called - library.exports):
         yield FUNCTIONS(f"the library does not export {abbreviate_names(missing, limit=5)}", member)
     if unused := sorted(
