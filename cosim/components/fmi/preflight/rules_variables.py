@@ -13,7 +13,8 @@ from collections.abc import Generator, Iterator, Mapping, Sequence
 from itertools import islice
 
 from ....core.errors import did_you_mean
-from .findings import DESCRIPTION_FILE, Finding, PreflightLimits, Rule
+from ....core.size_limits import MAX_SCALARS
+from .findings import DESCRIPTION_FILE, Finding, Rule
 from .model_description import (
     ALLOWED_INITIAL,
     ModelDescription,
@@ -290,6 +291,8 @@ LIMIT_VALUE = Rule("variable.limit-value", _START, "warning")
 DIMENSION = Rule("variable.dimension", _DIMENSION)
 SIZE = Rule("variable.size", "limits")
 
+#: largest number of elements of one array variable
+MAX_ARRAY_SIZE = 1_000_000
 _NON_NUMERIC_TYPES = ("String", "Binary", "Clock", "")
 
 
@@ -390,7 +393,7 @@ def _check_enumeration_start(variable: ModelVariable) -> Iterator[Finding]:
                 yield _variable_finding(RANGE, variable, text)
 
 
-def check_dimensions(model: ModelDescription, limits: PreflightLimits) -> Iterator[Finding]:
+def check_dimensions(model: ModelDescription) -> Iterator[Finding]:
     """Check dimensions and numbers of start values of arrays, and the number of all elements."""
     scalars = 0
     for variable in model.variables:
@@ -401,16 +404,16 @@ def check_dimensions(model: ModelDescription, limits: PreflightLimits) -> Iterat
         if shape is None:
             continue
         size = math.prod(shape)
-        if size > limits.max_array_size:
+        if size > MAX_ARRAY_SIZE:
             yield _variable_finding(
-                SIZE, variable, f"has {size} elements, expected at most {limits.max_array_size}"
+                SIZE, variable, f"has {size} elements, expected at most {MAX_ARRAY_SIZE}"
             )
             continue
         scalars += size * (1 + len(variable.aliases))
-        if scalars > limits.max_scalars:
+        if scalars > MAX_SCALARS:
             text = (
                 f"the variables up to this one have {scalars} elements, expected at most "
-                f"{limits.max_scalars}"
+                f"{MAX_SCALARS}"
             )
             yield _variable_finding(SIZE, variable, text)
             return
