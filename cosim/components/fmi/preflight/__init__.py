@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from io import BufferedReader
-from itertools import islice
+from itertools import islice, starmap
 from pathlib import Path
 
 from ....core.errors import InputError
@@ -21,7 +21,7 @@ from .findings import (
     Rule,
     raise_errors,
 )
-from .model_description import Interface, ModelDescription
+from .model_description import Interface, ModelDescription, Violation, to_finding
 from .platforms import current_platform
 from .xml import parse_xml
 from .xml_reader import check_repeated_elements, read_model
@@ -63,7 +63,7 @@ RUN_WARNINGS = frozenset(
 _MAX_FINDINGS_PER_CHECK = 100
 #: folders that a running FMU does not use
 _UNUSED_FOLDERS = ("documentation", "sources")
-_CHECKS: Sequence[Callable[[ModelDescription], Iterator[Finding]]] = (
+_CHECKS: Sequence[Callable[[ModelDescription], Iterator[Violation]]] = (
     *rules_model.CHECKS,
     *rules_variables.CHECKS,
     rules_variables.check_starts,
@@ -130,7 +130,7 @@ def _examine_archive(archive: Archive, result: Examination) -> None:
     model = result.model = read_model(root)
     result.findings += check_repeated_elements(root)
     for check in _CHECKS:
-        result.findings += islice(check(model), _MAX_FINDINGS_PER_CHECK)
+        result.findings += starmap(to_finding, islice(check(model), _MAX_FINDINGS_PER_CHECK))
     if not _has_errors(result.findings):
         for interface in model.interfaces:
             found = result.binary_findings[interface] = []
