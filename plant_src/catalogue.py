@@ -16,7 +16,7 @@ from cosim.core.errors import InputError, Problem, did_you_mean
 
 from .vehicles.common.shapes import Body, inertia_of
 from .vehicles.common.vehicle_reader import VehicleData, read_visual
-from .vehicles.data import VEHICLE_FILES
+from .vehicles.data import FOLDER
 from .vehicles.model import Model
 
 _Value = TypeVar("_Value")
@@ -27,6 +27,9 @@ NAMED_LISTS = ("rotors", "thrusters", "propellers")
 
 #: keys of a vehicle file of any family besides those of its family
 COMMON_KEYS = ("family", "name", "description", "sources", "validity", "visual", "$schema")
+
+#: vehicles that are given by a file, whose name is that of the vehicle
+_FILES = {file.stem: file for file in sorted(FOLDER.glob("*.json"))}
 
 
 def _model(
@@ -206,7 +209,7 @@ def _otter(name: str) -> Model:
 
 
 def _model_of_file(name: str) -> Model:
-    return model_from_data(json.loads(VEHICLE_FILES[name].read_text(encoding="utf-8")), name)
+    return model_from_data(json.loads(_FILES[name].read_text(encoding="utf-8")), name)
 
 
 class _LazyMapping(Mapping[str, _Value]):
@@ -247,7 +250,7 @@ BINARIES = (*FAMILIES, *_OWN_EQUATIONS)
 
 #: name -> model
 MODELS: Mapping[str, Model] = _LazyMapping(
-    {**{name: partial(_model_of_file, name) for name in VEHICLE_FILES}, **_OWN_EQUATIONS}
+    {**{name: partial(_model_of_file, name) for name in _FILES}, **_OWN_EQUATIONS}
 )
 
 

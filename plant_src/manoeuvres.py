@@ -269,6 +269,8 @@ def _reversals(motion: Track, angle: float, count: int) -> tuple[list[float], li
 
     An overshoot is NaN if the heading has not begun to return by the end of the track.
     """
+    # From each reversal on, the heading first swings on to its largest angle and then returns until
+    # it passes `angle` on the other side, which is the next reversal.
     times, overshoots, rows = [], [], slice(0, None)
     side = motion.turn_direction(angle)
     for _ in range(count):

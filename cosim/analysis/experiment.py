@@ -37,7 +37,7 @@ DEFAULT_SAMPLES, MIN_SAMPLES, MAX_STRIDE = 256, 8, 64
 
 #: entries of a scenario that an experiment replaces: all outputs are recorded, and nothing is
 #: evaluated or ends the run
-_REPLACED: Mapping[str, Any] = {
+REPLACED: Mapping[str, Any] = {
     "/record": {"signals": ["*"]},
     "/stop_when": [],
     "/kpis": [],
@@ -91,7 +91,7 @@ class Experiment:
                 return to a state.
             ComponentError: A component failed.
         """
-        settings = {**_REPLACED, **(parameters or {})}
+        settings = {**REPLACED, **(parameters or {})}
         spec = load_scenario(scenario, settings).spec
         begin = spec.start_time if at is None else _time("at", at)
         span = (

@@ -51,6 +51,9 @@ def realize(
         tolerance: Misfit of about this size is good enough, because the response itself varies as
             much; at most 0.001 counts.
     """
+    # The Hankel matrix of a linear system is the product of what the outputs show of a state and of
+    # how the inputs reach it. A singular value decomposition splits it into both factors; the number
+    # of singular values that are kept is the order. The matrix shifted by one sample gives A.
     rows, columns = _scales(response)
     scaled = response / rows[:, None] / columns
     lags = _lags(len(response))
@@ -210,6 +213,9 @@ def _measure_channel(
             for a, b in zip(response, magnitudes, strict=True)
         )
 
+    # A trial finds the size of a perturbation that changes no signal by more than `_CHANGE` of its
+    # magnitude. The differences for this size and twice of it cancel the error of second order
+    # (Richardson extrapolation), and their own difference measures the nonlinearity.
     trial = difference(_CHANGE)
     largest = peak(trial)
     if not largest:

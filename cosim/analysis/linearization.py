@@ -173,6 +173,8 @@ def _with_outputs_as_states(
     realization: Realization, names: Sequence[str]
 ) -> tuple[Realization, list[str]]:
     """Return the realization with outputs as states if there are enough, and their names."""
+    # Rows of C are taken in their order while they are linearly independent of those before
+    # (Gram-Schmidt process, done twice against rounding). Together they are the change of basis.
     order = len(realization.a)
     chosen: list[int] = []
     basis = np.zeros((0, order))

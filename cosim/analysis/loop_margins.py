@@ -184,6 +184,8 @@ def _phase_margins(
 
 def _disk_margin(loop: LoopResponse, frequencies: np.ndarray) -> tuple[float, float]:
     """Return the disk margin and its frequency (rad/s)."""
+    # The margin is the smallest distance 2 |1 + L| / |1 - L| (Seiler et al., see `LoopMargins`).
+    # Each round searches between the neighbours of the best frequency so far.
     for _ in range(_ZOOMS):
         values = loop.open_loop(frequencies)
         distances = np.abs(2 * (1 + values) / (1 - values))

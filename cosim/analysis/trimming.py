@@ -15,17 +15,10 @@ from ..scenario import PreparedRun
 from ..scenario.json_document import find_value, missing_value, pointer_keys
 from ..scenario.name_resolution import SlotIndex, UnknownNameError, resolve_name
 from ..scenario.nested_systems import load_scenario
-from .experiment import Scenario
+from .experiment import REPLACED, Scenario
 
 #: entries of a scenario that a trim replaces: nothing is recorded, evaluated or ends the run
-_REPLACED: Mapping[str, Any] = {
-    "/record": {"signals": []},
-    "/stop_when": [],
-    "/kpis": [],
-    "/figures": [],
-    "/checks": [],
-    "/events": [],
-}
+_REPLACED: Mapping[str, Any] = {**REPLACED, "/record": {"signals": []}, "/events": []}
 #: largest residual of an operating point that counts as found
 TOLERANCE = 1e-8
 #: relative step of the finite differences of the residuals

@@ -26,8 +26,7 @@ from ..core.errors import ComponentError, InputError, Problem, did_you_mean
 from ..core.system import Connection, Endpoint, System
 from ..core.time_grid import exact_divisor, exact_fraction
 from ..engine.plan import Plan, compile_plan
-from ..engine.plan_run import free_components
-from ..engine.run_loop import simulating
+from ..engine.plan_run import free_components, simulating
 from ..engine.settings import Settings
 from ..export.foreign import add_binary
 from ..process.float_mode import default_float_mode

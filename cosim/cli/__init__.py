@@ -84,8 +84,8 @@ COMMANDS = {
 }
 
 
-#: new objects after which Python searches for reference cycles
-_GC_THRESHOLD = 100_000
+#: new objects after which Python searches for reference cycles; a run with figures makes 400 000
+_GC_THRESHOLD = 500_000
 
 
 class _LazyGroup(click.Group):

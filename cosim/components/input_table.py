@@ -73,18 +73,12 @@ class InputTable(Component):
         """Move to the start time (s)."""
         self._current_time = start_time
 
-    def exit_initialization_mode(self) -> None:
-        """Do nothing."""
-
     def bind(self, _inputs: Ports, outputs: Ports) -> None:
         """Write the columns of the bound outputs to their arrays from now on."""
         self._cells = [
             (array, part.start, self._columns[variable.name])
             for variable, array, part in outputs.elements()
         ]
-
-    def set_inputs(self) -> None:
-        """Do nothing: an input table has no inputs."""
 
     def do_step(self, time: float, step_size: float) -> None:
         """Move to the end of the step, or to a row's time that differs from it only by rounding."""
@@ -116,15 +110,6 @@ class InputTable(Component):
     def set_state(self, state: float) -> None:
         """Return to a time (s) that `get_state` returned."""
         self._current_time = state
-
-    def free_state(self, state: float) -> None:
-        """Do nothing: a state is a number."""
-
-    def terminate(self) -> None:
-        """Do nothing."""
-
-    def free(self) -> None:
-        """Do nothing: an input table has no resources."""
 
 
 def _output_variable(name: str, kind: str) -> Variable:

@@ -185,15 +185,9 @@ class PythonFmuComponent(Component):
         """Restore a state that `get_state` returned."""
         self._slave._set_fmu_state(state) if self._has_custom_state else state()
 
-    def free_state(self, state: Any) -> None:
-        """Do nothing: states are garbage-collected."""
-
     def terminate(self) -> None:
         """Call the slave's `terminate`."""
         self._call_user_code("terminate", self._slave.terminate)
-
-    def free(self) -> None:
-        """Do nothing: the slave is garbage-collected."""
 
     def _call_user_code(self, function: str, call: Callable[..., Any], *arguments: Any) -> Any:
         """Call a method of the slave.

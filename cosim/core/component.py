@@ -295,6 +295,7 @@ class Component(Protocol):
 
     def exit_initialization_mode(self) -> None:
         """Exit the initialization mode of FMI and enter step mode."""
+        return
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         """Read inputs from and write outputs to these arrays from now on."""
@@ -308,6 +309,7 @@ class Component(Protocol):
 
     def set_inputs(self) -> None:
         """Read the values in the bound input arrays."""
+        return
 
     def do_step(self, time: float, step_size: float) -> StepResult | None:
         """Advance from `time` (s) to `time + step_size`.
@@ -375,11 +377,14 @@ class Component(Protocol):
     def set_state(self, state: Any) -> None:
         """Restore a snapshot bit for bit; it may be restored again."""
 
-    def free_state(self, state: Any) -> None:
+    def free_state(self, state: Any) -> None:  # noqa: ARG002
         """Release the memory of a snapshot."""
+        return
 
     def terminate(self) -> None:
         """End the simulation (FMI: terminate)."""
+        return
 
     def free(self) -> None:
         """Free the instance and its resources."""
+        return

@@ -13,9 +13,9 @@ def strong_components(successors: Mapping[T, Iterable[T]]) -> list[list[T]]:
     """Return the strongly connected components in reverse topological order.
 
     Tarjan's algorithm (1972) without recursion: a depth-first search numbers the nodes (`index`).
-    `low` is the smallest number that a node reaches through its subtree and one edge back to a node on
+    `low` is the smallest number that a node reaches through its subtree and one edge back to a node
+    on the stack. A node with low == index is the first one of its component, which lies above it on
     the stack.
-    A node with low == index is the first one of its component, which lies above it on the stack.
 
     Args:
         successors: Successors of every node; nodes that are not keys are ignored.

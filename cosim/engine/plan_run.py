@@ -1,4 +1,4 @@
-"""A plan that is being simulated.
+"""A plan that is being simulated, and simulation of a system from its start to its end.
 
 Initialize its components, step them with events and observers, and free them in every case.
 """
@@ -8,8 +8,8 @@ from __future__ import annotations
 import tempfile
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, nullcontext
-from dataclasses import dataclass
+from contextlib import ExitStack, closing, contextmanager, nullcontext, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -20,6 +20,7 @@ from ..core import component_log
 from ..core.component import Component
 from ..core.errors import ComponentError, InputError, Problem, join_alternatives
 from ..core.recording import Recording
+from ..core.system import System
 from ..process.float_mode import default_float_mode, is_default
 from ..process.journal import (
     MARKER_SIZE,
@@ -33,11 +34,12 @@ from ..process.journal import (
     suspending_deadline,
 )
 from ..process.process_state import call_restoring_process_state, restoring_process_state
-from . import Executor, Plan, Recorder, Termination, executor_class
+from . import Executor, Plan, Recorder, Termination, compile_plan, executor_class
 from .component_states import ComponentStates, SavedState
 from .initialization import instantiate_components
 from .pacer import Pacer, Stopwatch
 from .recorder import SavingRecorder, find_space_problems
+from .settings import Settings
 
 #: called with (completed macro steps, all macro steps); must not change the system
 Observer = Callable[[int, int], None]
@@ -391,3 +393,72 @@ def _create_executor(
         recorder = Recorder(plan, settings.rows_file)
     marker = None if journal is None else np.frombuffer(journal.memory, np.int64, MARKER_SIZE)
     return (executor or executor_class(settings.executor))(plan, recorder, marker)
+
+
+def simulate(
+    system: System,
+    settings: Settings,
+    observers: Sequence[Observer] = (),
+    step_hook: StepHook | None = None,
+) -> SimulationOutcome:
+    """Simulate a system of new components, and free them in every case.
+
+    Args:
+        system: the components must not have been used before.
+        settings: when and how to simulate.
+        observers: called about 100 times during the run.
+        step_hook: called before every macro step.
+
+    Returns:
+        The outcome. An error during the run is its `failure`; the rows recorded before are in its
+        `recording`.
+
+    Raises:
+        InputError: the system cannot be simulated with these settings.
+        ComponentError: a component cannot be freed.
+    """
+    outcome = None
+    try:
+        plan = compile_plan(system, settings)
+    except BaseException:
+        free_components(system.components)
+        raise
+    try:
+        with simulating(plan, observers, step_hook) as outcome:
+            pass
+    except ComponentError as error:  # from terminate or free
+        if outcome is None:
+            raise
+        outcome = replace(outcome, failure=error)
+    return outcome
+
+
+@contextmanager
+def simulating(
+    plan: Plan, observers: Sequence[Observer] = (), step_hook: StepHook | None = None
+) -> Iterator[SimulationOutcome]:
+    """Simulate a plan like `simulate`, but free its components only at the end of the block.
+
+    The block can save the outcome first, so that a crash in terminate or free cannot lose it.
+
+    Args:
+        plan: the compiled system.
+        observers: called about 100 times during the run.
+        step_hook: called before every macro step.
+
+    Yields:
+        The outcome, after the last step.
+
+    Raises:
+        InputError: the recorded rows are larger than the free disk space.
+        ComponentError: a component failed in terminate or free.
+    """
+    with default_float_mode(), closing(PlanRun(plan, step_hook)) as run:
+        with suppress(Exception, KeyboardInterrupt):  # it is the failure of the outcome
+            run.initialize()
+            run.advance(plan.grid.count, observers)
+        try:
+            yield run.outcome()
+        except BaseException as error:
+            run.failure = run.failure or error
+            raise

@@ -105,6 +105,11 @@ def connection_conversion(system: System, connection: Connection) -> tuple[float
 class TransferPlanner:
     """Groups connections into as few and as long transfers as possible.
 
+    The inputs lie in memory in the order in which they are read, so plain copies of one phase have
+    targets that are mostly consecutive. A gap between them is filled if the inputs in it are only
+    read in later phases: they get their present values, and the right ones in their own phase.
+    Conversions, delays, slopes and sums are transfers of their own.
+
     Args:
         system: its connections and variables.
         inputs: layout of the inputs.
@@ -161,9 +166,9 @@ class TransferPlanner:
         yield from self._linear_transfers(
             [c for c in connections if c.interpolation == "linear"], stepped
         )
-        for connection in (
-            connection for connection in connections if connection.interpolation == "hold"
-        ):
+        for connection in connections:
+            if connection.interpolation != "hold":
+                continue
             source, target = self._positions(connection)
             converted = self._conversion(connection) != (1.0, 0.0)
             groups[source.dtype, target.dtype, connection.delay, converted].append(connection)
@@ -441,7 +446,7 @@ class DelayLine:
         self._oldest = 0
 
     def deliver_line(self) -> None:
-        """Deliver values and slopes of a linear transfer; do not store the present source values."""
+        """Deliver values and slopes of a linear transfer; store no source values."""
         transfer, (before,) = self.transfer, self.ring
         now = transfer.source[transfer.source_indices]
         slopes = (now - before) / self.step_size

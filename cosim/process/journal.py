@@ -1,8 +1,12 @@
 """Record of the present activity of this process, which a supervisor reads after a crash.
 
-A journal is a small block of memory. It holds the marker of the executor (see `MARKER_SIZE`) and
-the present activity outside the stepping loop with its deadline. A process without a supervisor has
-no journal.
+A journal is a small block of memory that both processes map. It holds the marker of the executor
+(see `MARKER_SIZE`) and the present activity outside the stepping loop with its deadline. A process
+without a supervisor has no journal.
+
+There is no lock, because a process that crashed would never release it. Each field is one aligned
+word, which is written at once, and a counter of changes (`CHANGE_COUNT`) increases before the
+deadline changes. In the stepping loop only the executor's marker moves, which costs no call.
 """
 
 from __future__ import annotations
@@ -147,9 +151,8 @@ class Journal:
 
     def enter_phase(self, phase: Phase, deadline: float = math.inf) -> None:
         """Begin a phase with a maximum duration of each call (s)."""
-        self[CHANGE_COUNT] += (
-            1  # first, so that a reader of the new deadline also reads the new count
-        )
+        # first, so that a reader of the new deadline also reads the new count
+        self[CHANGE_COUNT] += 1
         self[DEADLINE] = -1 if math.isinf(deadline) else int(min(deadline * 1000, _MAX_DEADLINE))
         self[PHASE] = phase
 

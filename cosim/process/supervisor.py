@@ -289,21 +289,20 @@ class _Supervisor:
 
         Also one that has overwritten its journal, ignores an interrupt or was stopped from outside.
         """
+        # A call is late if the journal shows no progress for longer than its deadline. Progress is
+        # any change of the phase, of the step or of the call within the step, so that the deadline
+        # holds for each call, although the child records nothing but these numbers.
         journal, now = self.journal, time.monotonic()
         if not journal.is_valid:
             os.kill(self.child, signal.SIGKILL)
             return
         self._last_contents = journal.to_bytes()
-        deadline = (
-            journal.deadline
-        )  # read before `progress`: a later deadline might belong to the next call
+        # read before `progress`: a later deadline might belong to the next call
+        deadline = journal.deadline
         progress = journal[CHANGE_COUNT], journal[STEP_COUNT], journal[CALL_NUMBER]
         if progress != self._progress:
-            self._progress, self._progress_time, self._waiting_time = (
-                progress,
-                now,
-                waiting_time(self.child),
-            )
+            self._progress, self._progress_time = progress, now
+            self._waiting_time = waiting_time(self.child)
         elif now - self._progress_time > deadline and self._exceeds(deadline, now):
             self._timeout_reason = f"did not return within {deadline:g} s"
             request_stack(self.child, self.stack)

@@ -7,7 +7,7 @@ import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..core.errors import CosimError, InputError
 from ..core.text import count_noun
@@ -18,8 +18,10 @@ from .diagram import build_diagram
 from .figures import draw_figure, figure_to_svg
 from .pages import embed_json, render_page, safe_markup
 from .replay import find_failure, replay_data
-from .runs import NamedCall, load_figures, read_run
 from .tables import format_number
+
+if TYPE_CHECKING:
+    from .runs import NamedCall
 
 #: labels of timings in the order of the run
 TIMING_LABELS = {
@@ -208,6 +210,8 @@ def write_folder_report(
         InputError: The folder or the figures cannot be read, or the result has no rows.
         ComponentError: A figure of a complete run cannot be drawn.
     """
+    from .runs import read_run
+
     run = read_run(folder)
     checks = run.metadata.get("scenario", {}).get("checks", [])
     outcomes = evaluate_checks(run.kpis, [check for check in checks if check["kpi"] in run.kpis])
@@ -248,6 +252,8 @@ def draw_scenario_figures(
         run: The run.
         more_figures: Figures that are drawn before those of the scenario.
     """
+    from .runs import load_figures
+
     for name, function, arguments in [*more_figures, *load_figures(run)]:
         try:
             yield name, figure_to_svg(draw_figure(run, name, function, arguments))

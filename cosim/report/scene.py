@@ -33,9 +33,9 @@ from typing import Any
 
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, InputError, did_you_mean
 from ..results.files import to_json_types
+from ..scenario.component_sources import kind_of
 from ..scenario.extension import nested_content
 from ..scenario.named_functions import load_function
-from ..scenario.sources import kind_of
 
 LIST_KEYS = ("bodies", "fixed", "markers", "views", "spans", "marks", "plots")
 

@@ -30,8 +30,8 @@ from ..core.resources import available_processors
 from ..results import Result
 from ..results.files import writing_atomically
 from ..scenario.component_schema import change_paths
+from ..scenario.component_sources import kind_of
 from ..scenario.file_paths import relocating
-from ..scenario.sources import kind_of
 from .scene import flatten_components, static_method
 
 if TYPE_CHECKING:

@@ -20,9 +20,7 @@ from .tolerance_tube import (
     TimeWindows,
     Tolerance,
     Tube,
-    UniformTimeWindows,
     time_tolerance,
-    uniform_spacing,
 )
 
 #: share of all points up to which it is faster to compute the tube only at these points
@@ -176,20 +174,8 @@ class Comparer:
         rows: slice | np.ndarray = slice(None),
     ) -> Tube:
         time = self.points.time[rows]
-        if self._spacing and isinstance(rows, slice):
-            lower, upper = UniformTimeWindows(self._spacing, reach).extremes(reference)
-        else:
-            lower, upper = TimeWindows(self._reference.time, time, reach).extremes(reference)
+        lower, upper = TimeWindows(self._reference.time, time, reach).extremes(reference)
         return Tube(time, lower - half_width, upper + half_width)
-
-    @cached_property
-    def _spacing(self) -> float:
-        """Distance between points (s) if they are evenly spaced rows of the reference, else 0."""
-        return (
-            uniform_spacing(self.points.time)
-            if np.array_equal(self.points.time, self._reference.time)
-            else 0.0
-        )
 
     def _half_width(self, name: str, tolerance: Tolerance) -> float:
         return tolerance.half_width(_to_floats(self._reference, name))
@@ -297,7 +283,7 @@ class Comparer:
     def _tube_violation(
         self, name: str, tube: Tube, values: np.ndarray, distance: np.ndarray, half_width: float
     ) -> Verdict:
-        """Return the verdict on a signal with a positive `distance` from the tube at some points."""
+        """Return the verdict on a signal with a positive `distance` from the tube somewhere."""
         outside = np.flatnonzero(distance > 0)
         row, worst, unit = outside[0], int(distance.argmax()), self._unit_suffix(name)
         time, excess = float(tube.time[row]), _relative_excess(distance[worst], half_width)

@@ -138,12 +138,7 @@ def units(**unit_of: str) -> Callable[[KpiFunction], KpiFunction]:
     Returns:
         A decorator that returns the function itself.
     """
-
-    def declare(function: KpiFunction) -> KpiFunction:
-        vars(function)["units"] = unit_of
-        return function
-
-    return declare
+    return _declaring(units=unit_of)
 
 
 def better(**sense: Literal["lower", "higher"]) -> Callable[[KpiFunction], KpiFunction]:
@@ -158,12 +153,7 @@ def better(**sense: Literal["lower", "higher"]) -> Callable[[KpiFunction], KpiFu
     Returns:
         A decorator that returns the function itself.
     """
-
-    def declare(function: KpiFunction) -> KpiFunction:
-        vars(function)["better"] = sense
-        return function
-
-    return declare
+    return _declaring(better=sense)
 
 
 def no_value(reason: str) -> Callable[[KpiFunction], KpiFunction]:
@@ -178,9 +168,14 @@ def no_value(reason: str) -> Callable[[KpiFunction], KpiFunction]:
     Returns:
         A decorator that returns the function itself.
     """
+    return _declaring(no_value=reason)
+
+
+def _declaring(**attributes: Any) -> Callable[[KpiFunction], KpiFunction]:
+    """Return a decorator that adds attributes to a function."""
 
     def declare(function: KpiFunction) -> KpiFunction:
-        vars(function)["no_value"] = reason
+        vars(function).update(attributes)
         return function
 
     return declare

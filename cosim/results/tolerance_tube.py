@@ -22,9 +22,6 @@ import numpy as np
 #: relative difference up to which times are equal, because sums of decimal fractions are not exact
 RELATIVE_TIME_TOLERANCE = 1e-14
 
-#: deviation of evenly spaced rows, relative to their distance
-_SPACING_TOLERANCE = 1e-9
-
 
 class Tolerance(NamedTuple):
     """Permitted deviation from a reference.
@@ -121,56 +118,6 @@ class _Interpolation:
         """Return the values at the moments, shape (moments,)."""
         left, right = reference[self._left], reference[self._right]
         return np.asarray(left + self._fraction * (right - left))
-
-
-class UniformTimeWindows:
-    """Windows like `TimeWindows` around every row of an evenly spaced reference.
-
-    About nine times faster.
-    """
-
-    def __init__(self, spacing: float, reach: float):
-        rows = reach / spacing
-        self._count = round(rows) if abs(rows - round(rows)) < _SPACING_TOLERANCE else int(rows)
-        self._fraction = max(rows - self._count, 0.0)
-
-    def extremes(self, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the smallest and the largest value in each window, each of shape (rows,)."""
-        count, rows = self._count, len(reference)
-        padded = np.pad(reference, count + 1, mode="edge")
-        begins = self._interpolate_edges(padded[1:], padded, rows)
-        ends = self._interpolate_edges(padded[2 * count + 1 :], padded[2 * count + 2 :], rows)
-        lower, upper = (
-            _sliding_extreme(choose, padded[1:-1], 2 * count + 1)
-            for choose in (np.minimum, np.maximum)
-        )
-        return np.minimum(lower, np.minimum(begins, ends)), np.maximum(
-            upper, np.maximum(begins, ends)
-        )
-
-    def _interpolate_edges(self, last: np.ndarray, beyond: np.ndarray, rows: int) -> np.ndarray:
-        """Interpolate between the last row inside each window and the next one outside."""
-        return np.asarray(last[:rows] + self._fraction * (beyond[:rows] - last[:rows]))
-
-
-def _sliding_extreme(choose: np.ufunc, row: np.ndarray, width: int) -> np.ndarray:
-    """Return the extreme of each `width` neighbouring rows, from pieces of doubling width."""
-    length, rows = 1, len(row) - width + 1
-    while 2 * length <= width:
-        row = choose(row[:-length], row[length:])
-        length *= 2
-    return np.asarray(choose(row[:rows], row[width - length :][:rows]))
-
-
-def uniform_spacing(time: np.ndarray) -> float:
-    """Return the distance between rows (s) if they are evenly spaced, else 0."""
-    if len(time) < 2:
-        return 0.0
-    spacing = float(time[-1] - time[0]) / (len(time) - 1)
-    even = time[0] + spacing * np.arange(len(time))
-    return (
-        spacing if spacing > 0 and np.abs(even - time).max() < _SPACING_TOLERANCE * spacing else 0.0
-    )
 
 
 def time_tolerance(time: np.ndarray) -> float:

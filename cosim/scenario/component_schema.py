@@ -10,9 +10,9 @@ from pydantic import BaseModel, GetPydanticSchema, WithJsonSchema, create_model,
 from pydantic.fields import FieldInfo
 from pydantic_core.core_schema import no_info_plain_validator_function
 
+from .component_sources import ComponentSource, InputTableSource, NestedSystem, component_kinds
 from .evaluation_schema import CallSpec, ReferenceSpec
 from .schema_types import HoldsPaths, PathChange, Spec, key, path_keys
-from .sources import ComponentSource, InputTableSource, NestedSystem, component_kinds
 
 
 def _parse_component(value: Any) -> ComponentSource:

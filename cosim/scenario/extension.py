@@ -26,11 +26,11 @@ from ..core import paths
 from ..core.errors import InputError, Problem, did_you_mean, nearest_name
 from ..core.size_limits import MAX_LEVELS
 from .component_schema import change_paths
+from .component_sources import NestedSystem, component_kinds, kind_of
 from .file_paths import find_scenario, path_in, relocating, resolve_shipped_paths
 from .included_files import include_files
 from .json_document import Document, JsonPath, Origin, path_in_system, read_document
 from .schema import KEYED_LISTS, NOT_INHERITED
-from .sources import NestedSystem, component_kinds, kind_of
 
 #: entries with names -> their noun, and the keys of which an entry needs one to be new; without
 #: them it changes one of the base

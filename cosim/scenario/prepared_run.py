@@ -31,6 +31,7 @@ from ..process.float_mode import default_float_mode
 from ..process.journal import Deadlines, current_journal
 from ..process.process_state import exclusive_process_state
 from ..results import RunMetadata
+from .component_sources import ComponentFactory
 from .evaluation_schema import FunctionSpec
 from .file_paths import SHIPPED
 from .json_document import Document
@@ -38,7 +39,6 @@ from .named_functions import load_function, signal_problems
 from .nested_systems import Node, files_of_system, load_scenario
 from .overview import describe_software, describe_system
 from .schema import ScenarioSpec
-from .sources import ComponentFactory
 from .system_builder import PROFILE_PREFIX, SystemBuilder
 
 IsolationMode = Literal["fmu", "none"]

@@ -15,6 +15,7 @@ from ..core.system import Interpolation, IterationMethod
 from ..core.text import count_noun
 from ..engine.settings import NonFinitePolicy, StopOutcome
 from .component_schema import ComponentSpec, component_model
+from .component_sources import InputTableSource
 from .evaluation_schema import CallSpec, CheckSpec, FunctionSpec, ReferenceSpec
 from .schema_types import (
     INVALID,
@@ -31,7 +32,6 @@ from .schema_types import (
     key,
     schema_of,
 )
-from .sources import InputTableSource
 
 #: pattern of the names of scenarios
 SCENARIO_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$"

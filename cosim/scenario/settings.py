@@ -16,6 +16,7 @@ from typing import Any
 
 from ..core.errors import InputError, Problem
 from ..core.text import acceptable_text, shorten, text_problem
+from .component_sources import component_kinds
 from .extension import expand_set_systems, inherited_component
 from .file_paths import change_pointed, relocating
 from .included_files import include_in_setting
@@ -30,7 +31,6 @@ from .json_document import (
     set_value,
     value_path,
 )
-from .sources import component_kinds
 
 
 def apply_settings(

@@ -18,6 +18,7 @@ from ..core.system import Connection, Endpoint, System
 from ..engine.pacer import LatePolicy
 from ..engine.plan import Plan, compile_plan
 from ..engine.settings import Event, Settings
+from .component_sources import ComponentFactory, Creation
 from .function_arguments import FunctionResolver, without_placeholders
 from .name_resolution import (
     SlotIndex,
@@ -31,7 +32,6 @@ from .named_functions import find_function_problems
 from .nested_systems import Node, Scenario
 from .recorded_signals import read_stop_conditions, select_signals
 from .schema_types import accepted
-from .sources import ComponentFactory, Creation
 from .stages import StagePlanner, parallel_mode
 from .wiring import Wiring
 

@@ -19,10 +19,10 @@ from ..core.errors import Problem, did_you_mean, nearest_name
 from ..core.json_values import copy_json
 from ..core.text import REPLACEMENT, count_noun
 from .component_schema import component_model
+from .component_sources import ComponentSource
 from .json_document import Document
 from .schema import SystemSpec
 from .schema_types import INVALID, PlacedError, hint_at_quotes
-from .sources import ComponentSource
 
 S = TypeVar("S", bound=SystemSpec)
 

@@ -190,6 +190,7 @@ class Design:
                 factor.level_at(x)
                 for factor, x in zip(self.factors, self.unit_samples[index].tolist(), strict=True)
             ]
+        # the digits of the index in a number system whose bases are the numbers of levels
         levels = []
         for factor in reversed(self.factors):
             index, level = divmod(index, len(factor.grid_levels))

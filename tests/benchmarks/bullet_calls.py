@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from plant_src.physics.bullet import pybullet
 
 

@@ -11,7 +11,7 @@ from cost_measurement import Stopwatch
 from cosim.components.fmi import FmuFile, create_component
 from cosim.core.system import Connection, Endpoint, System
 from cosim.engine import ExecutorKind, native_available
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 
 STEP = Fraction(1, 100)

@@ -22,8 +22,7 @@ from cosim.components.fmi import FmuFile, Isolation, create_component
 from cosim.core.system import Endpoint, System
 from cosim.engine import ExecutorKind, Recorder, compile_plan, executor_class
 from cosim.engine.initialization import instantiate_components
-from cosim.engine.plan_run import SimulationOutcome
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import SimulationOutcome, simulate
 from cosim.engine.settings import Settings
 
 STEPS, BATCH, WIDTH, STARTS = 5_000, 50, 16, 20

@@ -21,7 +21,7 @@ from pathlib import Path
 from cosim.components.fmi import FmuFile, create_component
 from cosim.results.csv_files import write_csv
 from cosim.results.parquet_files import write_parquet
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 from cosim.core.system import Endpoint, System
 steps, step = int(sys.argv[2]) - 1, Fraction(1, 100)

@@ -19,7 +19,7 @@ from cosim_contender import executor_label, executors
 from cost_measurement import Stopwatch, measure_rounds, print_heading, print_rows
 
 from cosim.engine import ExecutorKind
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.scenario import load
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"

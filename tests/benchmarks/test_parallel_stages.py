@@ -14,7 +14,7 @@ from slow_fmus import slow_fmu
 
 from cosim.components.fmi import FmuFile, create_component
 from cosim.core.system import Parallel, System
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 
 #: duration of a step (s), number of steps

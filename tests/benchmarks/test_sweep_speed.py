@@ -9,7 +9,7 @@ import pytest
 
 import cosim
 from cosim.components.fmi import FmuFile
-from cosim.engine.run_loop import simulating
+from cosim.engine.plan_run import simulating
 from cosim.results import Result
 from cosim.results.kpi import evaluate_kpis
 from cosim.scenario import find_scenario, load, load_scenario

@@ -106,12 +106,8 @@ def test_a_new_controller_declares_the_variables_of_its_role(moved, role, langua
             "/checks=[]",
             "/figures=[]",
         ]
-    done = cosim(
-        "check",
-        "demo1_box",
-        *(word for text in settings for word in ("--set", text)),
-        cwd=moved(role, language),
-    )
+    options = [f"--set={text}" for text in settings]
+    done = cosim("check", "demo1_box", *options, cwd=moved(role, language))
     assert done.returncode == 0, done.stderr
 
 

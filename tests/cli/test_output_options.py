@@ -3,6 +3,7 @@
 import json
 import logging
 import re
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -175,11 +176,8 @@ def test_list_names_what_is_shipped():
     assert [entry["name"] for entry in listed["scenarios"]] == sorted(
         path.stem for path in (ROOT / "scenarios").glob("*.json")
     )
-    assert all(
-        Path(entry["file"]).is_file() and entry["description"]
-        for found in listed.values()
-        for entry in found
-    )
+    for found in listed.values():
+        assert all(Path(entry["file"]).is_file() and entry["description"] for entry in found)
 
 
 def test_scenarios_are_listed_in_the_groups_of_their_document():
@@ -197,9 +195,8 @@ def test_scenarios_are_listed_in_the_groups_of_their_document():
         names = "".join(row.split("|")[1] for row in rows.splitlines())
         documented[head.lower()] = sorted(re.findall(r"`(\w+)`", names))
     assert listed == documented
-    assert sorted(name for names in listed.values() for name in names) == sorted(
-        path.stem for path in (ROOT / "scenarios").glob("*.json")
-    )
+    names = sorted(chain.from_iterable(listed.values()))
+    assert names == sorted(path.stem for path in (ROOT / "scenarios").glob("*.json"))
 
 
 def test_an_fmu_in_place_of_a_scenario_is_explained():

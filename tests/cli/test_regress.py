@@ -164,7 +164,10 @@ def test_every_scenario_of_a_folder_is_reported(folder):
     assert "body: do_step failed at t = 0 s: ValueError: no body cools that fast" in done.stdout
     assert "end.value is 48.5" in done.stdout
     cases = etree.parse(folder / "junit.xml").getroot().findall("testsuite/testcase")
-    assert {case.get("name"): [part.tag for part in case] for case in cases} == {
+    outcomes = {}
+    for case in cases:
+        outcomes[case.get("name")] = [part.tag for part in case]
+    assert outcomes == {
         "cold": ["failure"],
         "crashing": ["error"],
         "good": [],

@@ -1,6 +1,7 @@
 import math
 import re
 
+import numpy as np
 import pytest
 
 from cosim.core.units import (
@@ -215,11 +216,10 @@ def test_unreadable_input_is_refused(text):
 )
 def test_products_of_units(factors, expected):
     assert multiply_units(factors) == expected
-    exponents = [
-        sum(power * parse_unit(text).exponents[i] for text, power in factors)
-        for i in range(len(BASE_UNITS))
-    ]
-    assert list(parse_unit(expected).exponents) == exponents
+    exponents = np.zeros(len(BASE_UNITS), int)
+    for text, power in factors:
+        exponents += power * np.array(parse_unit(text).exponents)
+    assert parse_unit(expected).exponents == tuple(exponents)
 
 
 @pytest.mark.parametrize(

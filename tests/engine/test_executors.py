@@ -17,7 +17,7 @@ from cosim.core.system import FLOAT_TYPES, Connection, Endpoint, Group, System, 
 from cosim.core.time_grid import exact_fraction
 from cosim.core.units import parse_unit
 from cosim.engine import EXECUTORS, native_available, parallel
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 from cosim.engine.thread_pool import ThreadPool
 from cosim.process import journal
@@ -76,16 +76,11 @@ def random_system(seed, extra=()):
     """
     draw = random.Random(seed)  # noqa: S311
     components = {f"m{i}": random_component(100 * seed + i) for i in range(5)} | dict(extra)
-    ends = {
-        causality: [
-            Endpoint(n, s)
-            for n, c in components.items()
-            for v in c.variables
-            if v.causality == causality
-            for s in v.scalar_names
-        ]
-        for causality in ("input", "output")
-    }
+    ends: dict[str, list[Endpoint]] = {"input": [], "output": []}
+    for name, component in components.items():
+        for variable in component.variables:
+            own = [Endpoint(name, scalar) for scalar in variable.scalar_names]
+            ends.setdefault(variable.causality, []).extend(own)
     find_element = System(components).find_element
     connections = []
     for target in ends["input"]:
@@ -114,10 +109,11 @@ def random_system(seed, extra=()):
 
 
 def bits(recording):
-    return {
-        name: [struct.pack("d", x) if isinstance(x, float) else x for x in column.tolist()]
-        for name, column in recording.columns.items()
-    }
+    found = {"time": recording.time.tobytes()}
+    for name, column in recording.columns.items():
+        values = column.tolist()
+        found[name] = [struct.pack("d", x) if isinstance(x, float) else x for x in values]
+    return found
 
 
 def recorded(kind, build, share=1.0, interval="1/100"):

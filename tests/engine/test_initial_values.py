@@ -82,12 +82,8 @@ def test_a_linear_network_of_many_components_is_solved():
     rng = np.random.default_rng(3)
     n = 6
     matrix, constant = rng.normal(size=(n, n)), rng.normal(size=n)
-    parts = {
-        f"s{i}": FakeComponent(
-            [*inputs(*(f"u{j}" for j in range(n))), *outputs("y")], *_row(matrix[i], constant[i])
-        )
-        for i in range(n)
-    }
+    variables = [*inputs(*(f"u{j}" for j in range(n))), *outputs("y")]
+    parts = {f"s{i}": FakeComponent(variables, *_row(matrix[i], constant[i])) for i in range(n)}
     wires = ", ".join(f"s{j}.y > s{i}.u{j}" for i in range(n) for j in range(n))
     names = [f"s{i}.y" for i in range(n)]
     recording = run_system(make_system(parts, wires), 1, 1, names)

@@ -15,7 +15,7 @@ from cosim.core.errors import ComponentError, InputError
 from cosim.core.system import Endpoint, Group, Iteration
 from cosim.core.time_grid import exact_fraction
 from cosim.engine import EXECUTORS
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 from cosim.scenario import load
 

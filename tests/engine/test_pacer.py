@@ -15,7 +15,7 @@ import cosim.engine.pacer
 from cosim.core.errors import InputError, LateError
 from cosim.core.time_grid import TimeGrid, exact_fraction
 from cosim.engine.pacer import Pacer
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 
 pytestmark = pytest.mark.usefixtures("executor")

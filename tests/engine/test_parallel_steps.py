@@ -9,7 +9,7 @@ from systems import endpoint, make_system
 from cosim.components.fmi import FmuFile, create_component
 from cosim.core.errors import ComponentError
 from cosim.core.time_grid import exact_fraction
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Event, Settings
 
 pytestmark = pytest.mark.usefixtures("executor")

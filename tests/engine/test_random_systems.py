@@ -56,8 +56,10 @@ def random_system(seed):
     """
     draw = random.Random(seed)  # noqa: S311
     names = [f"m{i}" for i in range(draw.randint(2, 5))]
-    units = {name: [draw.choice(list(UNITS)) for _ in range(draw.randint(1, 6))] for name in names}
-    outs = [(Endpoint(name, f"y{j}"), unit) for name in names for j, unit in enumerate(units[name])]
+    units = {name: draw.choices(list(UNITS), k=draw.randint(1, 6)) for name in names}
+    outs = []
+    for name in names:
+        outs += [(Endpoint(name, f"y{j}"), unit) for j, unit in enumerate(units[name])]
     connections = []
     for name in names:
         for j, unit in enumerate(units[name]):
@@ -74,11 +76,8 @@ def random_system(seed):
     grouped = draw.sample(names, draw.choice([0, 0, 1, 2]))
     outside = [name for name in names if name not in grouped]
     stages = in_stages(draw, outside + ([Group("g", in_stages(draw, grouped))] if grouped else []))
-    periods = {
-        name: exact_fraction(f"{count}/10")
-        for name in names
-        if (count := draw.choice([1, 1, 1, 2, 3])) > 1
-    }
+    counts = {name: draw.choice([1, 1, 1, 2, 3]) for name in names}
+    periods = {name: exact_fraction(f"{n}/10") for name, n in counts.items() if n > 1}
     components = {name: mixer(i, units[name]) for i, name in enumerate(names)}
     return System(components, connections, stages, periods), units
 
@@ -93,9 +92,9 @@ class ReferenceImporter:
     def __init__(self, system, units):
         self.system, self.units = system, units
         self.seeds = {name: i for i, name in enumerate(units)}
-        self.y = {
-            name: [self.seeds[name] + 0.1 * j for j in range(len(units[name]))] for name in units
-        }
+        self.y = {}
+        for name in units:
+            self.y[name] = [self.seeds[name] + 0.1 * j for j in range(len(units[name]))]
         self.u = {name: [0.0] * len(units[name]) for name in units}
         self.terms = {(c.target, c.term): 0.0 for c in system.connections if c.term}
         self.delayed = {

@@ -28,7 +28,7 @@ from cosim.core.errors import InputError
 from cosim.core.system import Connection, Group, Iteration, System
 from cosim.core.time_grid import exact_fraction
 from cosim.engine import compile_plan
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 from cosim.results.csv_files import read_csv
 

@@ -17,7 +17,7 @@ from cosim.core.system import Group
 from cosim.core.text import escape_control_characters
 from cosim.core.time_grid import exact_fraction
 from cosim.core.units import parse_unit
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 
 pytestmark = pytest.mark.usefixtures("executor")

@@ -16,7 +16,7 @@ from systems import make_system
 from cosim.cli import CommandLine, cli, run_guarded
 from cosim.core.errors import InputError
 from cosim.engine import executor_class, native_available, native_executor
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 from cosim.export.fmu.compiler import find_compiler
 
@@ -56,7 +56,8 @@ def message(stale, monkeypatch):
     found, module = stale
     monkeypatch.setattr(native_executor, "_native", module)
     return (
-        f"the native executor {module.__file__} has interface {found}, expected {native_executor.INTERFACE}: "
+        f"the native executor {module.__file__} has interface {found}, expected "
+        f"{native_executor.INTERFACE}: "
         "build it again with `python setup.py build_ext --inplace` in the checkout\n"
     )
 

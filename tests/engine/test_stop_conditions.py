@@ -14,8 +14,7 @@ from cosim.core.component import StepResult, Variable
 from cosim.core.expressions import parse_condition
 from cosim.core.time_grid import exact_fraction
 from cosim.engine import EXECUTORS, compile_plan
-from cosim.engine.plan_run import PlanRun, SimulationOutcome
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import PlanRun, SimulationOutcome, simulate
 from cosim.engine.settings import Event, Settings, StopCondition
 
 
@@ -88,7 +87,10 @@ def first_end(values: list[float], hold: int, every: int) -> int | None:
     """
     begin = None
     for n in range(0, len(values), every):
-        begin = None if values[n] <= 0 else n if begin is None else begin
+        if values[n] <= 0:
+            begin = None
+        elif begin is None:
+            begin = n
         if begin is not None and n - begin >= hold:
             return n
     return None
@@ -212,7 +214,8 @@ def random_condition(random: np.random.Generator, depth: int = 0) -> str:
         else random.choice(["comparison", "chain", "and", "or", "not", "term"])
     )
     if kind in ("and", "or"):
-        return f"({f' {kind} '.join(random_condition(random, depth + 1) for _ in range(random.integers(2, 4)))})"
+        parts = [random_condition(random, depth + 1) for _ in range(random.integers(2, 4))]
+        return f"({f' {kind} '.join(parts)})"
     if kind == "not":
         return f"(not {random_condition(random, depth + 1)})"
     operators = ["<", "<=", ">", ">=", "==", "!="]

@@ -40,7 +40,9 @@ MODEL_EXPORT double twice(double x) { return 2 * x; }
 
 void model_start(Model *m)
 {
-    *m = (Model){.gain = 2.0, .limit = 10.0, .weights = {1.0, 0.5, 0.25}, .repeat = 1, .mode = INTEGRATE, .enabled = true};
+    *m = (Model){.gain = 2.0, .limit = 10.0, .weights = {1.0, 0.5, 0.25}, .repeat = 1};
+    m->mode = INTEGRATE;
+    m->enabled = true;
     m->active_mode = HOLD;
 }
 
@@ -49,7 +51,8 @@ void model_parameters(Model *m) { m->doubled_gain = twice(m->gain); }
 static void outputs(Model *m)
 {
     for (int i = 0; i < 3; ++i) m->outputs[i] = m->weights[i] * m->integral;
-    for (int i = 0; i < 2; ++i) m->inner_product[i] = m->matrix[i][0] * m->integral + m->matrix[i][1];
+    for (int i = 0; i < 2; ++i)
+        m->inner_product[i] = m->matrix[i][0] * m->integral + m->matrix[i][1];
     m->saturated = fabs(m->integral) > m->limit;
     m->active_mode = m->mode;
 }
@@ -68,7 +71,8 @@ const char *model_step(Model *m, double time, double step_size)
 {
     if (m->mode == FAIL) return "assertion: mode is FAIL (100 % #sure)";
     for (int i = 0; i < m->repeat; ++i)
-        if (m->enabled && m->mode == INTEGRATE) m->integral += m->doubled_gain * m->input * step_size;
+        if (m->enabled && m->mode == INTEGRATE)
+            m->integral += m->doubled_gain * m->input * step_size;
     m->clock = time + step_size;
     m->steps += 1;
     outputs(m);

@@ -28,10 +28,8 @@ def test_the_binary_is_in_the_folder_that_the_standard_defines(version, fmu):
     from fmpy import platform, platform_tuple, sharedLibraryExtension
 
     with ZipFile(fmu) as archive:
-        assert (
-            f"binaries/{platform if version == 2 else platform_tuple}/sample{sharedLibraryExtension}"
-            in archive.namelist()
-        )
+        folder = platform if version == 2 else platform_tuple
+        assert f"binaries/{folder}/sample{sharedLibraryExtension}" in archive.namelist()
 
 
 def test_resources_are_packed_under_their_names(block, tmp_path):

@@ -29,7 +29,9 @@ class LeakyIntegrator(Fmi2Slave):
         self.history = [0.0]
         self.vehicle = SimpleNamespace(x=1.0)
         self.register_variable(Real("vehicle.x", causality=Fmi2Causality.input))
-        self.register_variable(Real("gain", causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
+        self.register_variable(
+            Real("gain", causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable)
+        )
         self.register_variable(Real("y", causality=Fmi2Causality.output))
         self.register_variable(Integer("steps", causality=Fmi2Causality.output))
         self.register_variable(Boolean("moving", causality=Fmi2Causality.local))

@@ -83,11 +83,8 @@ def test_foreign_code_finds_no_descriptor_of_the_lock(tmp_path):
 
     def descriptors_of_lock() -> list[str]:
         links = [f"/proc/self/fd/{number}" for number in os.listdir("/proc/self/fd")]  # noqa: PTH208
-        return [
-            path
-            for link in links
-            if os.path.lexists(link) and LOCK_FILE in (path := os.readlink(link))  # noqa: PTH115
-        ]
+        targets = [os.readlink(link) for link in links if os.path.lexists(link)]  # noqa: PTH115
+        return [path for path in targets if LOCK_FILE in path]
 
     with LockKeeper() as keeper:
         keeper.lock(tmp_path / LOCK_FILE, tmp_path)

@@ -7,7 +7,7 @@ import pytest
 from fakes import counter
 from systems import endpoint, make_system
 
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 from cosim.process.row_store import FileMapping
 from cosim.results.csv_files import read_csv, write_csv

@@ -62,11 +62,11 @@ def test_figures_and_report_are_those_of_a_run_in_one_process(tmp_path):
         assert "run.json, curve1.png, curve2.png, report.html in" in done.stdout
     for name in ("curve1.png", "curve2.png", "result.csv", "kpis.json"):
         assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "none" / name).read_bytes()
-    reports = [(tmp_path / mode / "report.html").read_text() for mode in ("run", "none")]
-    first, second = (
-        [line for line in report.splitlines() if "<path" in line] for report in reports
-    )
-    assert first == second != []
+    drawings = []
+    for mode in ("run", "none"):
+        report = (tmp_path / mode / "report.html").read_text()
+        drawings.append([line for line in report.splitlines() if "<path" in line])
+    assert drawings[0] == drawings[1] != []
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,8 @@ def test_csv_has_the_documented_format(tmp_path):
     }
     write_csv(Recording(np.array([0.0, 0.01]), columns, {}), tmp_path / "result.csv")
     assert (tmp_path / "result.csv").read_bytes().decode() == (
-        '"time","plant.uav.position.x","plant.uav.contact.vessel","uav.vtol.mode","usv.waypoint_x[1]","log of ""uav"""\n'
+        '"time","plant.uav.position.x","plant.uav.contact.vessel","uav.vtol.mode",'
+        '"usv.waypoint_x[1]","log of ""uav"""\n'
         '0.0,0.1,0,1,1e+16,"take-off"\n'
         '0.01,-2.5e-7,1,-3,1.0,"said ""go"", then flew"\n'
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import cosim
-from cosim.scenario import component_schema, load_scenario, sources
+from cosim.scenario import component_schema, component_sources, load_scenario
 from cosim.studies.execution.bundle import collect_bundle
 
 PAGE = (Path(cosim.__file__).parents[1] / "docs/python.md").read_text("utf-8")
@@ -41,7 +41,7 @@ def installed(tmp_path):
 
 
 def forget_kinds():
-    sources._kinds_of_packages.cache_clear()
+    component_sources._kinds_of_packages.cache_clear()
     component_schema.component_model.cache_clear()
 
 
@@ -132,7 +132,9 @@ def test_without_the_package_the_key_is_unknown(replay, folder):
 )
 def test_a_wrong_entry_point_names_its_package(replay, installed, kind, text):
     module = installed / "recordings.py"
-    module.write_text(f"from cosim.scenario.sources import FmuSource\n{module.read_text()}")
+    module.write_text(
+        f"from cosim.scenario.component_sources import FmuSource\n{module.read_text()}"
+    )
     file = installed / "recordings-1.0.dist-info/entry_points.txt"
     file.write_text(f"[cosim.sources]\nrecording = recordings:{kind}\n")
     with pytest.raises(cosim.InputError) as refusal:

@@ -10,7 +10,7 @@ from cosim.core.component import Component
 from cosim.core.recording import Recording
 from cosim.core.system import Connection, Endpoint, Stage, System
 from cosim.core.time_grid import exact_fraction
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Event, Settings
 
 

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import os
 import platform
-import shutil
 import subprocess
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from importlib import metadata
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -129,25 +128,19 @@ def _package_findings() -> Iterator[Finding]:
 
 def _extra_finding(extra: str, requirements: Iterable[Requirement]) -> Finding:
     """Return the finding about an extra; other extras that it includes have their own findings."""
-    own = [
-        r
-        for r in requirements
-        if r.marker and r.marker.evaluate({"extra": extra}) and not r.marker.evaluate({"extra": ""})
-    ]
-    packages = [r for r in own if r.name != DISTRIBUTION]
-    missing = [
-        f"{r.name}: {_installed_version(r)[0]}" for r in packages if not _installed_version(r)[1]
-    ]
+    versions, missing = [], []
+    for each in requirements:
+        marker = each.marker
+        is_own = marker and marker.evaluate({"extra": extra}) and not marker.evaluate({"extra": ""})
+        if is_own and each.name != DISTRIBUTION:
+            version, fits = _installed_version(each)
+            versions.append(f"{each.name} {version}")
+            if not fits:
+                missing.append(f"{each.name}: {version}")
     if missing:
-        return Finding(
-            "extras",
-            extra,
-            f"{'; '.join(missing)} (pip install '{DISTRIBUTION}[{extra}]')",
-            "missing",
-        )
-    return Finding(
-        "extras", extra, ", ".join(f"{r.name} {_installed_version(r)[0]}" for r in packages)
-    )
+        text = f"{'; '.join(missing)} (pip install '{DISTRIBUTION}[{extra}]')"
+        return Finding("extras", extra, text, "missing")
+    return Finding("extras", extra, ", ".join(versions))
 
 
 def _installed_version(requirement: Requirement) -> tuple[str, bool]:
@@ -162,104 +155,81 @@ def _installed_version(requirement: Requirement) -> tuple[str, bool]:
 
 
 def _tool_findings() -> Iterator[Finding]:
-    from ...core.errors import InputError
     from ...export.fmu.compiler import compiler_version, find_compiler
-
-    try:
-        yield Finding("tools", "C compiler", compiler_version(tuple(find_compiler())))
-    except (InputError, OSError) as error:
-        yield Finding("tools", "C compiler", str(error), "missing")
-    yield _windows_finding()
-    yield from _library_findings()
-
-
-def _windows_finding() -> Finding:
-    """Return the finding about FMUs for Windows, which need Wine and a compiler for Windows."""
-    from ...export.fmu.compiler import compiler_version
     from ...export.foreign.windows_fmus import find_windows_compiler, find_wine
-
-    name, wine = "FMUs for Windows", find_wine()
-    if not wine:
-        return Finding(
-            "tools", name, "no program wine64 or wine: 64-bit libraries cannot be used", "missing"
-        )
-    try:
-        compiler = compiler_version(tuple(find_windows_compiler()))
-    except (InputError, OSError) as error:
-        return Finding("tools", name, str(error), "missing")
-    version = _program_finding(name, wine, "--version").found
-    return Finding("tools", name, f"{version} with {compiler}: 64-bit libraries only")
-
-
-def _library_findings() -> Iterator[Finding]:
-    """Yield the Modelica libraries of MODELICAPATH."""
     from ...export.modelica.frontend.libraries import libraries_in, library_folders
 
-    title, folders = "Modelica libraries", library_folders([])
+    yield _tried("C compiler", lambda: compiler_version(tuple(find_compiler())))
+    name, wine = "FMUs for Windows", find_wine()
+    if wine:
+        compiler = _tried(name, lambda: compiler_version(tuple(find_windows_compiler())))
+        text = f"{_program_version(wine)} with {compiler.found}: 64-bit libraries only"
+        yield compiler if compiler.state == "missing" else Finding("tools", name, text)
+    else:
+        text = "no program wine64 or wine: 64-bit libraries cannot be used"
+        yield Finding("tools", name, text, "missing")
+    name, folders = "Modelica libraries", library_folders([])
     if not folders:
-        yield Finding("tools", title, "MODELICAPATH is not set", "missing")
+        yield Finding("tools", name, "MODELICAPATH is not set", "missing")
     for folder in folders:
         try:
             found = ", ".join(map(str, libraries_in([folder])))
         except InputError as error:
-            yield Finding("tools", title, f"MODELICAPATH: {error}", "missing")
+            yield Finding("tools", name, f"MODELICAPATH: {error}", "missing")
         else:
-            yield Finding(
-                "tools", title, f"{folder}: {found or 'none'}", "ok" if found else "missing"
-            )
+            yield _either("tools", name, found and f"{folder}: {found}", f"{folder}: none")
 
 
-def _program_finding(name: str, program: str, option: str) -> Finding:
-    """Return the finding about a program, with the first line of its version text."""
-    path = shutil.which(program)
-    if path is None:
-        return Finding("tools", name, f"no program {program}", "missing")
+def _either(section: str, name: str, found: str, missing: str) -> Finding:
+    """Return a finding that is missing if `found` is ""."""
+    return Finding(section, name, found or missing, "ok" if found else "missing")
+
+
+def _tried(name: str, find: Callable[[], str]) -> Finding:
+    """Return the finding about a tool, which is missing if `find` raises an error."""
     try:
-        done = subprocess.run([path, option], capture_output=True, text=True, check=True, timeout=5)  # noqa: S603
+        return Finding("tools", name, find())
+    except (InputError, OSError) as error:
+        return Finding("tools", name, str(error), "missing")
+
+
+def _program_version(path: str) -> str:
+    """Return the first line of the version text of a program."""
+    try:
+        done = subprocess.run(  # noqa: S603
+            [path, "--version"], capture_output=True, text=True, check=True, timeout=5
+        )
     except (OSError, subprocess.SubprocessError) as error:
-        return Finding("tools", name, f"{path} does not work: {error}", "missing")
-    return Finding("tools", name, done.stdout.partition("\n")[0].strip())
+        return f"{path} does not work: {error}"
+    return done.stdout.partition("\n")[0].strip()
 
 
 def _sandbox_findings() -> Iterator[Finding]:
     from ...process.sandbox import find_available_sandboxes, probe_restrictions
 
     available = find_available_sandboxes()
-    if available.landlock:
-        yield Finding("sandbox", "Landlock", f"version {available.landlock}: can confine files")
-    else:
-        yield Finding("sandbox", "Landlock", "not in this kernel (Linux 5.13 or newer)", "missing")
-    if available.system_call_filter:
-        yield Finding(
-            "sandbox", "system call filter", "can close the network and all other processes"
-        )
-    else:
-        yield Finding(
-            "sandbox",
-            "system call filter",
-            "needs Linux with seccomp on x86_64 or aarch64",
-            "missing",
-        )
-    if available.bubblewrap:
-        yield Finding(
-            "sandbox", "bubblewrap", f"{available.bubblewrap} works: --sandbox strict can be used"
-        )
-    else:
-        yield Finding(
-            "sandbox",
-            "bubblewrap",
-            "no working program bwrap; --sandbox strict cannot be used",
-            "missing",
-        )
-    yield from (
-        Finding("this process", name.replace("_", " "), _yes_or_no(value))
-        for name, value in asdict(probe_restrictions()).items()
+    yield _either(
+        "sandbox",
+        "Landlock",
+        f"version {available.landlock}: can confine files" if available.landlock else "",
+        "not in this kernel (Linux 5.13 or newer)",
     )
-
-
-def _yes_or_no(value: Any) -> str:
-    return (
-        {True: "yes", False: "no", None: "unlimited"}[value]
-        if value is None or isinstance(value, bool)
-        else str(value)
+    has_filter = available.system_call_filter
+    yield _either(
+        "sandbox",
+        "system call filter",
+        "can close the network and all other processes" if has_filter else "",
+        "needs Linux with seccomp on x86_64 or aarch64",
     )
+    program = available.bubblewrap
+    yield _either(
+        "sandbox",
+        "bubblewrap",
+        f"{program} works: --sandbox strict can be used" if program else "",
+        "no working program bwrap; --sandbox strict cannot be used",
+    )
+    words = {True: "yes", False: "no", None: "unlimited"}
+    for name, value in asdict(probe_restrictions()).items():
+        is_word = value is None or isinstance(value, bool)
+        text = words[value] if is_word else str(value)
+        yield Finding("this process", name.replace("_", " "), text)

@@ -143,8 +143,8 @@ def _simulate(
     from ...api.single_fmu import compile_fmu, parse_solver
     from ...components.fmi import InstanceSettings
     from ...core.errors import InputError, Problem
+    from ...engine.plan_run import simulating
     from ...engine.recorder import find_space_problems
-    from ...engine.run_loop import simulating
     from ...process.run_files import keeping_run_files, remove_run_files, run_folder
     from ...results.checks import warn_non_finite
     from ...results.files import remove_files

@@ -97,10 +97,8 @@ class AccessorCallFactory:
         For the native executor it is a call with the arguments of FMI 3.0, whose last one has the
         size of a pointer. The function of FMI 3.0 has one more argument, and is called from Python.
         """
-        count, name = (
-            len(variables),
-            f"{self.prefix}{verb}{_SLOPE_FUNCTIONS[verb, self.fmi_major > 2]}",
-        )
+        count = len(variables)
+        name = f"{self.prefix}{verb}{_SLOPE_FUNCTIONS[verb, self.fmi_major > 2]}"
         references = (ctypes.c_uint32 * count)(
             *(self.value_references[variable.derivative_of] for variable in variables)
         )
@@ -109,10 +107,8 @@ class AccessorCallFactory:
             raise InputError(
                 f"the library does not export {name}, which the capabilities of the FMU promise"
             )
-        function, addresses = (
-            self.functions[name],
-            [ctypes.addressof(references), ctypes.addressof(orders), slopes.ctypes.data],
-        )
+        function = self.functions[name]
+        addresses = [ctypes.addressof(references), ctypes.addressof(orders), slopes.ctypes.data]
         pointers = [as_pointer(address) for address in addresses]
         arguments = (as_pointer(self.instance), pointers[0], as_size(count), *pointers[1:])
         if self.fmi_major > 2:

@@ -10,18 +10,15 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
 from ...core.component import DTYPES, Causality, Variability, Variable
-from ...core.errors import InputError, join_alternatives
 from ...core.size_limits import require_at_most
 from ...core.time_grid import exact_fraction
 from ...core.units import BASE_UNITS, Unit, named_unit
-from .preflight import DEFAULT_LIMITS, Examination, PreflightLimits, raise_errors
-from .preflight.binary import list_platforms
+from .preflight import DEFAULT_LIMITS, PreflightLimits
 from .preflight.model_description import (
     Interface,
     ModelDescription,
@@ -169,29 +166,16 @@ class FmuDescription:
 
 
 def build_description(
-    path: Path, examination: Examination, interface: Interface | None = None
+    model: ModelDescription, interface: Interface, platforms: Sequence[str]
 ) -> FmuDescription:
-    """Build the description of an examined FMU.
+    """Build the description of an FMU without errors.
 
     Args:
-        path: The FMU, for messages.
-        examination: Result of the preflight check.
-        interface: Interface through which the FMU is simulated; by default the preferred one that
-            it has.
-
-    Raises:
-        InputError: The examination found errors, or the FMU does not have the interface.
+        model: Its model description.
+        interface: Interface through which the FMU is simulated, one of those that it has.
+        platforms: Platforms with a binary, see `list_platforms`.
     """
-    raise_errors(path, examination.findings)
-    model = examination.model
-    assert model is not None  # otherwise the examination has found an error
-    selected = next(iter(model.interfaces)) if interface is None else interface
-    if selected not in model.interfaces:
-        raise InputError(
-            f'"{path}": has no interface for {selected}, only for '
-            f"{join_alternatives(model.interfaces)}"
-        )
-    attributes, is_model_exchange = model.interfaces[selected], selected == "model-exchange"
+    attributes, is_model_exchange = model.interfaces[interface], interface == "model-exchange"
     units = {unit.name: _build_unit(unit) for unit in model.units}
     variables: dict[str, Variable] = {}
     references: dict[str, int] = {}
@@ -214,7 +198,7 @@ def build_description(
         model.root["fmiVersion"],
         model.root.get("modelName", ""),
         tuple(model.interfaces),
-        selected,
+        interface,
         attributes["modelIdentifier"],
         model.root["instantiationToken" if model.major == 3 else "guid"],
         model.root.get("description", ""),
@@ -228,12 +212,12 @@ def build_description(
         is_model_exchange or is_true(attributes, "canHandleVariableCommunicationStepSize"),
         is_true(attributes, "canBeInstantiatedOnlyOncePerProcess"),
         is_true(attributes, "needsExecutionTool"),
-        _count_states(model, selected),
+        _count_states(model, interface),
         indicator_count,
         is_true(attributes, "needsCompletedIntegratorStep")
         if model.major == 3
         else not is_true(attributes, "completedIntegratorStepNotNeeded"),
-        list_platforms(examination.members),
+        platforms,
         [name for name in model.log_categories if name in _ERROR_CATEGORIES],
         dependencies,
         dependencies | _read_dependencies(model, "InitialUnknown"),

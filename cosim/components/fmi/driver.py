@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.component import Component, Ports, PreparedCall, StepResult, Variable
+from ...core.component import Component, Ports, PreparedCall, Variable
 from ...core.system import FLOAT_TYPES
 from .accessor_calls import AccessorCallFactory, prepare_negations
 from .api import OK, FmiApi
@@ -172,25 +171,6 @@ class FmuDriver(FmuComponent):
     ) -> Sequence[float] | None:
         """Return the directional derivatives of outputs; None if the FMU does not offer them."""
         return self.api.get_directional_derivative(outputs, input_name)
-
-    @abstractmethod
-    def prepare_step_calls(
-        self, current_time: ctypes.c_double, step_size: float
-    ) -> Sequence[PreparedCall]:
-        """Prepare the calls that set the inputs, make one step and get the outputs.
-
-        Args:
-            current_time: Memory from which the calls read the start of the step (s).
-            step_size: Length of the step (s).
-        """
-
-    @abstractmethod
-    def interpret_status(self, function: str, status: int) -> StepResult:
-        """Interpret a bad status of a prepared call.
-
-        Raises:
-            ComponentError: The status is a failure.
-        """
 
     def terminate(self) -> None:
         """Call fmi*Terminate, unless an instance of the FMU has returned fatal."""

@@ -13,7 +13,7 @@ from hashlib import file_digest
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...core.errors import InputError
+from ...core.errors import InputError, join_alternatives
 from ...process.journal import current_journal, suspending_deadline
 from ...process.temporary_folders import FMU_PREFIX, LockedFolder
 from .description import FmuDescription, build_description
@@ -29,7 +29,7 @@ from .preflight import (
     raise_errors,
 )
 from .preflight.archive import Archive
-from .preflight.binary import WINDOWS, can_be_compiled
+from .preflight.binary import WINDOWS, list_platforms
 from .preflight.platforms import current_platform
 
 #: largest number of FMU contents, and of extracted folders on the disk
@@ -212,7 +212,17 @@ class FmuFile:
             return None
 
     def _build_description(self) -> FmuDescription:
-        return build_description(self.path, self.examination, self._interface)
+        raise_errors(self.path, self.examination.findings)
+        model = self.examination.model
+        assert model is not None  # otherwise the examination has found an error
+        preferred, selected = next(iter(model.interfaces)), self._interface
+        interface = preferred if selected is None else selected
+        if interface not in model.interfaces:
+            raise InputError(
+                f'"{self.path}": has no interface for {interface}, only for '
+                f"{join_alternatives(model.interfaces)}"
+            )
+        return build_description(model, interface, list_platforms(self.examination.members))
 
     @property
     def has_binary(self) -> bool:
@@ -229,7 +239,7 @@ class FmuFile:
     @property
     def must_be_compiled(self) -> bool:
         """True for an FMU that has sources but no binary for this platform."""
-        return not self.has_binary and can_be_compiled(self.description.platforms)
+        return not self.has_binary and "c-code" in self.description.platforms
 
     @property
     def run_warning(self) -> str:
@@ -307,11 +317,9 @@ class FmuFile:
         """
         assert self._folder is not None
         other = copy(self)
-        other._folder, other._extracted, other._reference_count = (
-            _BorrowedFolder(self._folder.name),
-            None,
-            0,
-        )
+        other._folder = _BorrowedFolder(self._folder.name)
+        other._extracted = None
+        other._reference_count = 0
         other.library, other.has_fatal_error = None, False
         return other
 

@@ -204,7 +204,7 @@ _handlers: dict[int, tuple[bytes, _MessageHandler]] = {}
 
 
 def register_logger(callbacks: Any, instance_name: str, handler: _MessageHandler) -> int:
-    """Set the logger in the callback functions of an instance.
+    """Set logger and memory management in the callback functions of an instance.
 
     Args:
         callbacks: FMPy's fmi1CallbackFunctions or fmi2CallbackFunctions.
@@ -215,10 +215,14 @@ def register_logger(callbacks: Any, instance_name: str, handler: _MessageHandler
         The key of the registration, for `unregister_logger`. It is the componentEnvironment of
         FMI 2.0.
     """
+    from fmpy import calloc, free
+
     key = next(_environments)
     _handlers[key] = instance_name.encode(), handler
     logger = ctypes.c_void_p(_logger.LOGGER) if _logger else _UNFORMATTED
     callbacks.logger = ctypes.cast(logger, type(callbacks.logger))
+    callbacks.allocateMemory = type(callbacks.allocateMemory)(calloc)
+    callbacks.freeMemory = type(callbacks.freeMemory)(free)
     if hasattr(callbacks, "componentEnvironment"):
         callbacks.componentEnvironment = key
     return key

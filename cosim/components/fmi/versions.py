@@ -67,12 +67,10 @@ class Fmi1Api(FmiApi):
     model_functions = _MODEL_FUNCTIONS | {"get_nominals": "GetNominalContinuousStates"}
 
     def _create(self, logging_on: bool) -> None:
-        from fmpy import calloc, fmi1, free
+        from fmpy import fmi1
 
         callbacks = fmi1.fmi1CallbackFunctions()
         self._log_key = register_logger(callbacks, self.name, self.log)
-        callbacks.allocateMemory = fmi1.fmi1CallbackAllocateMemoryTYPE(calloc)
-        callbacks.freeMemory = fmi1.fmi1CallbackFreeMemoryTYPE(free)
         with suppress(Exception):  # FMPy's exception of a null pointer has no reason
             self._fmu.instantiate(functions=callbacks, loggingOn=logging_on)
         if not self._fmu.component:
@@ -127,12 +125,10 @@ class Fmi2Api(FmiApi):
     model_functions = _MODEL_FUNCTIONS
 
     def _create(self, logging_on: bool) -> None:
-        from fmpy import calloc, fmi2, free
+        from fmpy import fmi2
 
         callbacks = fmi2.fmi2CallbackFunctions()
         self._log_key = register_logger(callbacks, self.name, self.log)
-        callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
-        callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
         try:
             self._fmu.instantiate(callbacks=callbacks, loggingOn=logging_on)
         except Exception:

@@ -97,6 +97,9 @@ def enter_sandbox(settings: SandboxSettings) -> None:
     limits.set_limits(
         settings.memory, settings.open_files, settings.file_size, settings.cpu_seconds
     )
+    # The order matters. The kernel demands that a process that confines itself gives up privileges
+    # first. The environment is cleared before Landlock hides /proc, and the system call filter is
+    # last, because it denies the calls by which session and limits are set.
     if settings.confine:
         clear_environment()
         landlock.confine(settings.readable, settings.writable)

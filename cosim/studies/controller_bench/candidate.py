@@ -18,10 +18,10 @@ from ...core.component import Component, Variable
 from ...core.errors import InputError, Problem, did_you_mean, nearest_file
 from ...core.time_grid import fraction_text
 from ...scenario import load
+from ...scenario.component_sources import component_kinds
 from ...scenario.name_resolution import SlotIndex, Target, UnknownNameError, resolve_name
 from ...scenario.nested_systems import Node, load_scenario
 from ...scenario.schema import NestedSpec
-from ...scenario.sources import component_kinds
 from .role import Role
 
 _CANDIDATE = "candidate"

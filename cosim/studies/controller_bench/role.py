@@ -34,7 +34,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 from ...components.fmi import FmuFile
 from ...core import resources
@@ -170,7 +170,7 @@ def _validate_role(document: Document) -> RoleSpec:
     if document.problems:
         raise InputError(document.problems)
     try:
-        return TypeAdapter(RoleSpec).validate_python(document.value)
+        return RoleSpec.model_validate(document.value)
     except ValidationError as error:
         raise InputError(
             Problem(found["msg"], document.where(found["loc"])) for found in error.errors()

@@ -18,12 +18,12 @@ from typing import Any, NamedTuple
 from ...core.errors import InputError
 from ...results.files import write_json
 from ...scenario.component_schema import change_paths
+from ...scenario.component_sources import kind_of, texts_in
 from ...scenario.evaluation_schema import FunctionSpec
 from ...scenario.extension import nested_content
 from ...scenario.file_paths import relocating
 from ...scenario.named_functions import declared_arguments
 from ...scenario.nested_systems import load_scenario
-from ...scenario.sources import kind_of, texts_in
 from .candidate import CandidateInterface, CandidateSource
 from .role import Role
 

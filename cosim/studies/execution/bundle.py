@@ -15,8 +15,8 @@ from ...components.python_import import package_files, package_root
 from ...core import __version__, paths, resources
 from ...core.errors import InputError, Problem
 from ...scenario import load_scenario
+from ...scenario.component_sources import FmuSource, texts_in
 from ...scenario.nested_systems import Node
-from ...scenario.sources import FmuSource, texts_in
 
 
 def cosim_fingerprint() -> str:

@@ -18,7 +18,7 @@ import numpy as np
 from ...components.fmi import FmuFile
 from ...core.errors import ComponentError, CosimError, InputError, Problem
 from ...core.json_values import parse_object
-from ...engine.run_loop import simulating
+from ...engine.plan_run import simulating
 from ...process.float_mode import default_float_mode
 from ...process.journal import EXIT_CODE, Phase, current_journal
 from ...process.run_files import keeping_run_files

@@ -329,6 +329,8 @@ def _wrap(
 
     `break_words` also breaks between characters.
     """
+    # `textwrap` counts characters, so the number of characters per line begins at an estimate from
+    # their average width, and falls until the widest line fits.
     average = _text_width([text], size, weight) / max(1, len(text))
     longest = min(len(text), int(_WIDTH_VARIATION * width / average)) if average else 1
     lines = [text]

@@ -1,12 +1,10 @@
-"""Vehicle files: one JSON file for each vehicle, whose name is that of the vehicle.
+"""Vehicle files, one for each vehicle (README.md).
 
-`README.md` describes them. They are found from this module, so that FMUs with the world contain
-them: `cosim build` adds the JSON files beside imported modules.
+The folder is a package, so that copies of the plant, for example in an FMU, contain the files.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-#: file of each vehicle by name, sorted
-VEHICLE_FILES = {file.stem: file for file in sorted(Path(__file__).parent.glob("*.json"))}
+FOLDER = Path(__file__).parent

@@ -24,7 +24,7 @@ from cosim.components.fmi import (
 from cosim.core.component import Variable
 from cosim.core.errors import ComponentError
 from cosim.core.system import Connection, Group, Iteration, System
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Event, Settings
 
 pytestmark = pytest.mark.usefixtures("executor")

@@ -12,7 +12,7 @@ from cosim_command import run_cosim
 from systems import endpoint, make_system, run_system
 
 from cosim.components.fmi import FmuFile, Isolation, create_component
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 
 pytestmark = pytest.mark.usefixtures("executor")

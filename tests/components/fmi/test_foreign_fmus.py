@@ -13,7 +13,7 @@ from systems import endpoint, make_system, run_system
 from cosim.components.fmi import FmuFile, Isolation, create_component, file
 from cosim.core.errors import ComponentError, InputError
 from cosim.core.time_grid import exact_fraction
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 
 pytestmark = pytest.mark.usefixtures("executor")

@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from datetime import date
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -127,7 +128,8 @@ def public_blocks(library: Library) -> list[str]:
     """Return the names, below PACKAGE, of all blocks that are neither partial nor in internal
     packages.
     """
-    names = (name for file in library.files if file.suffix == ".mo" for name in _blocks_in(file))
+    files = [file for file in library.files if file.suffix == ".mo"]
+    names = chain.from_iterable(map(_blocks_in, files))
     return sorted(
         name.removeprefix(f"{PACKAGE}.") for name in names if name.startswith(f"{PACKAGE}.")
     )
@@ -174,9 +176,8 @@ def _model(name: str, block: str) -> str:
         return f"block {name}\n  extends {PACKAGE}.{block}{arguments};\nend {name};\n"
     inputs = [declaration.split() for declaration in INPUTS[block]]
     declarations = "".join(f"  {PACKAGE}.Interfaces.{kind}Input {port};\n" for kind, port in inputs)
-    equations = "".join(
-        f"  b.{port} = {port};\n" for port in (port.partition("[")[0] for _, port in inputs)
-    )
+    ports = [port.partition("[")[0] for _, port in inputs]
+    equations = "".join(f"  b.{port} = {port};\n" for port in ports)
     return (
         f"block {name}\n{declarations}  {PACKAGE}.{block} b{arguments};\nequation\n{equations}end "
         f"{name};\n"

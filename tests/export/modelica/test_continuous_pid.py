@@ -71,7 +71,7 @@ def vessel_rate(_t: float, state: np.ndarray, thrust: float) -> list[float]:
 
 
 def expected(duration: float) -> np.ndarray:
-    """Return speed and thrust at every communication point; the controller steps before the vessel."""
+    """Return speed and thrust at every communication point, the controller stepped first."""
 
     def over_a_step(rate, state, *held):
         return solve_ivp(rate, (0, STEP), state, "DOP853", args=held, rtol=1e-11, atol=1e-12).y[

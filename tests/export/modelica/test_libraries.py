@@ -39,7 +39,8 @@ end Gain;
 """
 BLOCKS = """
 package Blocks "a library; annotation(version=\\"9\\") in a text is none"
-  annotation(version="2.1.0", uses(Constants(version="1.0")), conversion(noneFromVersion="2.0.0", from(version="1.0")));
+  annotation(version="2.1.0", uses(Constants(version="1.0")),
+    conversion(noneFromVersion="2.0.0", from(version="1.0")));
 end Blocks;
 """
 CONSTANTS = 'package Constants constant Real factor = 2; annotation(version="1.0"); end Constants;'

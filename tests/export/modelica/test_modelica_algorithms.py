@@ -86,7 +86,12 @@ end M;""")
     y = z = 0.0
     for _, i in model.simulate():
         u, k = i["u"], i["k"]
-        y = 1.0 if u > 1 else 2.0 if k > 0 else 3.0 if k < -2 else y
+        if u > 1:
+            y = 1.0
+        elif k > 0:
+            y = 2.0
+        elif k < -2:
+            y = 3.0
         if u > 0:
             z = 5.0
         else:

@@ -123,9 +123,10 @@ class Pid:
         self.filtered = error if reset else self.filtered + self.alpha * (error - self.filtered)
         unlimited = self.kp * error + self.integral + self.kd * self.nd * (error - self.filtered)
         saturated = abs(unlimited) > self.limit and unlimited * error > 0
-        self.integral = (
-            0.0 if reset else self.integral if saturated else self.integral + self.ki * 0.01 * error
-        )
+        if reset:
+            self.integral = 0.0
+        elif not saturated:
+            self.integral += self.ki * 0.01 * error
         return min(self.limit, max(-self.limit, unlimited))
 
 
@@ -202,7 +203,10 @@ def test_waypoint_guidance_against_numpy(compile_both, repeat):
         if math.sqrt((wx[active] - i["x"]) ** 2 + (wy[active] - i["y"]) ** 2) <= 0.8:
             finished = finished or (active == 5 and not repeat)
             switches += not finished
-            active = active + 1 if active < 5 else 0 if repeat else 5
+            if active < 5:
+                active += 1
+            elif repeat:
+                active = 0
         bearing = math.atan2(wy[active] - i["y"], wx[active] - i["x"]) - i["psi"]
         assert (model.get("active"), model.get("finished")) == (active + 1, finished)
         assert model.get("error") == (

@@ -83,9 +83,12 @@ equation
 end M;""")
     for _, inputs in model.simulate(100):
         u = inputs["u"]
-        assert (model.get("y"), model.get("z")) == (
-            (1, 2) if u > 1 else (3 * u, 3) if u < -1 else (u, 0)
-        )
+        expected = (u, 0)
+        if u > 1:
+            expected = (1, 2)
+        elif u < -1:
+            expected = (3 * u, 3)
+        assert (model.get("y"), model.get("z")) == expected
 
 
 def test_if_equations_on_parameters_outside_when(compile_both):

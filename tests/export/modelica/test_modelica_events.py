@@ -81,8 +81,14 @@ end M;""")
     y, z, was = 0.0, 0.0, -1.0
     for k, inputs in model.run():
         u = inputs["u"]
-        y += 1 if u > 1 and was <= 1 else -1 if u < 2 and was >= 2 else 0
-        z = u if k % 2 == 0 else -u if u > 0 and was <= 0 else z
+        if u > 1 and was <= 1:
+            y += 1
+        elif u < 2 and was >= 2:
+            y -= 1
+        if k % 2 == 0:
+            z = u
+        elif u > 0 and was <= 0:
+            z = -u
         was = u
         assert (model.get("y"), model.get("z")) == (y, z)
 

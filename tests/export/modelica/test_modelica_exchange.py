@@ -57,9 +57,15 @@ def fmu(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 
 def simulate_with_fmpy(fmu: Path, interface: str) -> np.ndarray:
     return fmpy.simulate_fmu(
-        str(fmu), fmi_type=interface, stop_time=STOP, output_interval=STEP, relative_tolerance=1e-9, output=OUTPUTS,
-        start_values={"push": 1.0}, record_events=False,
-    )  # fmt: skip
+        str(fmu),
+        fmi_type=interface,
+        stop_time=STOP,
+        output_interval=STEP,
+        relative_tolerance=1e-9,
+        output=OUTPUTS,
+        start_values={"push": 1.0},
+        record_events=False,
+    )
 
 
 def simulate_with_cosim(fmu: Path, solver: str | None) -> cosim.Result:

@@ -121,7 +121,8 @@ model M
   output Integer number;
 equation
   when sample(0, 0.01) then
-    mode = if pre(mode) == Mode.idle then first elseif wanted > Mode.climb then Mode.hold else pre(mode);
+    mode = if pre(mode) == Mode.idle then first
+      elseif wanted > Mode.climb then Mode.hold else pre(mode);
     number = Integer(mode);
   end when;
 end M;""")
@@ -129,7 +130,10 @@ end M;""")
     assert model.c.variables["mode"].start == 1
     mode = 1
     for _, inputs in model.simulate(50, first=2):
-        mode = 2 if mode == 1 else 3 if inputs["wanted"] > 2 else mode
+        if mode == 1:
+            mode = 2
+        elif inputs["wanted"] > 2:
+            mode = 3
         assert (model.get("mode"), model.get("number")) == (mode, mode)
 
 

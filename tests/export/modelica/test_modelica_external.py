@@ -150,24 +150,28 @@ TABLE = """package Tables
       input Integer extrapolation;
       input String label;
       output Table result;
-    external "C" result = ModelicaStandardTables_CombiTable1D_init3(label, table, size(table, 1), columns, smoothness)
+    external "C" result = ModelicaStandardTables_CombiTable1D_init3(
+        label, table, size(table, 1), columns, smoothness)
       annotation(Include="#include \\"tables.h\\"");
     end constructor;
     function destructor
       input Table table;
-    external "C" ModelicaStandardTables_CombiTable1D_close(table) annotation(Include="#include \\"tables.h\\"");
+    external "C" ModelicaStandardTables_CombiTable1D_close(table)
+      annotation(Include="#include \\"tables.h\\"");
     end destructor;
   end Table;
   pure function value
     input Table table;
     input Integer row;
     output Real y;
-  external "C" y = ModelicaStandardTables_CombiTable1D_getValue(table, row) annotation(Include="#include \\"tables.h\\"");
+  external "C" y = ModelicaStandardTables_CombiTable1D_getValue(table, row)
+    annotation(Include="#include \\"tables.h\\"");
   end value;
 end Tables;
 """
 TABLE_HEADER = """#include <stddef.h>
-void *ModelicaStandardTables_CombiTable1D_init3(const char *name, const double *values, size_t n, const int *columns, int kind);
+void *ModelicaStandardTables_CombiTable1D_init3(
+    const char *name, const double *values, size_t n, const int *columns, int kind);
 void ModelicaStandardTables_CombiTable1D_close(void *table);
 double ModelicaStandardTables_CombiTable1D_getValue(void *table, int row);
 """
@@ -177,7 +181,8 @@ TABLE_SOURCE = """#include "tables.h"
 #include <string.h>
 __attribute__((visibility("default"))) int open_tables;
 typedef struct { size_t n; double values[]; } Table;
-void *ModelicaStandardTables_CombiTable1D_init3(const char *name, const double *values, size_t n, const int *columns, int kind)
+void *ModelicaStandardTables_CombiTable1D_init3(
+    const char *name, const double *values, size_t n, const int *columns, int kind)
 {
     if (strcmp(name, "curve") != 0) ModelicaFormatError("the table has the name %s", name);
     if (values[0] < 0) ModelicaError("the first value is negative");
@@ -192,7 +197,10 @@ void ModelicaStandardTables_CombiTable1D_close(void *table)
     open_tables--;
     free(table);
 }
-double ModelicaStandardTables_CombiTable1D_getValue(void *table, int row) { return ((Table *)table)->values[row - 1]; }
+double ModelicaStandardTables_CombiTable1D_getValue(void *table, int row)
+{
+    return ((Table *)table)->values[row - 1];
+}
 """
 TABLE_MODEL = """model M
   parameter String name = "curve";

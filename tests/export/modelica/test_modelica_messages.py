@@ -18,7 +18,8 @@ MODEL = """model Guarded
   output Real y;
 equation
   y = 2*u;
-  assert(u < limit, "u is " + String(u) + ", above 100% of " + String(limit), AssertionLevel.warning);
+  assert(u < limit, "u is " + String(u) + ", above 100% of " + String(limit), \
+AssertionLevel.warning);
   assert(u < 2, "u = " + String(u) + " is too large: " + String(u > 5));
 end Guarded;"""
 

@@ -7,7 +7,7 @@ import cosim
 from cosim.core.component import Component
 from cosim.core.system import Connection, Endpoint, System
 from cosim.core.time_grid import exact_fraction
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Event, Settings
 from plant_src.sensors.fault import SignalFault
 from plant_src.sensors.gnss import Gnss

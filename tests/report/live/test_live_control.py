@@ -13,7 +13,7 @@ import cosim.report.live.session
 from cosim.core.component import Variable
 from cosim.core.errors import ComponentError
 from cosim.core.time_grid import TimeGrid
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Event, Settings
 from cosim.process.run_files import ROWS_FILE, SIGNALS, TIME, Column, RowLayout, RowsFile
 from cosim.report.live.control import LiveControl

@@ -13,7 +13,7 @@ from cosim.components.fmi import FmuFile, create_component
 from cosim.core import resources
 from cosim.core.system import Endpoint
 from cosim.core.time_grid import exact_fraction
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 
 FMUS = sorted(resources.root().glob("fmus/**/*.fmu"))

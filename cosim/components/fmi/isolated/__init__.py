@@ -114,10 +114,8 @@ class IsolatedFmu(FmuComponent):
         """Allocate the shared memory that mirrors the bound arrays."""
         self._shared_memory = SharedMemoryBlock(inputs, outputs)
         self._current_time = self._shared_memory.current_time
-        self._input_buffers, self._output_buffers = (
-            matching_buffers(self._shared_memory.inputs, inputs),
-            matching_buffers(outputs, self._shared_memory.outputs),
-        )
+        self._input_buffers = matching_buffers(self._shared_memory.inputs, inputs)
+        self._output_buffers = matching_buffers(outputs, self._shared_memory.outputs)
         self._input_strings, self._output_strings = string_array(inputs), string_array(outputs)
         self._has_strings = len(self._input_strings) + len(self._output_strings) > 0
 

@@ -83,10 +83,8 @@ class SpinningPoller:
             if ready := poll(0):
                 self._next_backoff = 1
                 return ready
-        self._spins_to_skip, self._next_backoff = (
-            self._next_backoff,
-            min(2 * self._next_backoff, MAX_SPIN_BACKOFF),
-        )
+        self._spins_to_skip = self._next_backoff
+        self._next_backoff = min(2 * self._next_backoff, MAX_SPIN_BACKOFF)
         return []
 
 

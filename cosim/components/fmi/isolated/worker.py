@@ -38,6 +38,17 @@ from .messages import (
 )
 from .shared_memory import SharedMemoryBlock, string_array
 
+#: commands that are methods of the component
+_FORWARDED = (
+    "set",
+    "get",
+    "get_directional_derivative",
+    "enter_initialization_mode",
+    "exit_initialization_mode",
+    "do_step",
+    "terminate",
+    "free",
+)
 #: characters of a log message; the importer shortens messages to its own limit
 _MAX_MESSAGE_LENGTH = 1 << 20
 
@@ -58,10 +69,8 @@ class Worker:
             setup: Function that enters the sandbox, called before foreign code is loaded.
         """
         self._instance, self._block, self._setup = instance, block, setup
-        self._input_strings, self._output_strings = (
-            string_array(block.inputs),
-            string_array(block.outputs),
-        )
+        self._input_strings = string_array(block.inputs)
+        self._output_strings = string_array(block.outputs)
         self._calls: Sequence[
             tuple[int, Callable[..., int], tuple[Any, ...], bool, PreparedCall]
         ] = ()
@@ -69,21 +78,14 @@ class Worker:
         self._state_numbers = count()
         self._commands: dict[str, Callable[..., Any]] = {
             "instantiate": self._instantiate,
-            "set": instance.set,
-            "get": instance.get,
-            "get_directional_derivative": instance.get_directional_derivative,
-            "enter_initialization_mode": instance.enter_initialization_mode,
-            "exit_initialization_mode": instance.exit_initialization_mode,
+            **{name: getattr(instance, name) for name in _FORWARDED},
             "set_inputs": self._set_inputs,
-            "do_step": instance.do_step,
             "get_outputs": self._get_outputs,
             "prepare_step": self._prepare_step,
             "step": self._step_with_strings,
             "get_state": self._get_state,
             "set_state": lambda number: instance.set_state(self._states[number]),
             "free_state": lambda number: instance.free_state(self._states.pop(number)),
-            "terminate": instance.terminate,
-            "free": instance.free,
         }
 
     def serve(self, commands: int, answers: int, temporary: Path) -> None:
@@ -101,10 +103,8 @@ class Worker:
         journals.set_current_journal(self._block.journal)
         tempfile.tempdir = os.environ["TMPDIR"] = str(temporary)
         # the importer limits number and length of the messages
-        component_log.MAX_MESSAGES_PER_SECOND, component_log.MAX_MESSAGE_LENGTH = (
-            sys.maxsize,
-            _MAX_MESSAGE_LENGTH,
-        )
+        component_log.MAX_MESSAGES_PER_SECOND = sys.maxsize
+        component_log.MAX_MESSAGE_LENGTH = _MAX_MESSAGE_LENGTH
         sender = _LineSender(answers)
         logger = logging.getLogger("cosim.component")
         logger.handlers, logger.propagate, logger.level = [sender], False, logging.INFO
@@ -170,7 +170,7 @@ class Worker:
 
         The journal records the index of the present call.
         """
-        calls = self._instance.prepare_step_calls(self._block.current_time, step_size)
+        calls = self._instance.prepare_step_calls(self._block.current_time, step_size) or ()
         self._calls = [
             (index, call.function, call.arguments, isinstance(call.native, NativeDoStep), call)
             for index, call in enumerate(calls)

@@ -60,6 +60,7 @@ class Integrator(Protocol):
 
     def inputs_changed(self) -> None:
         """Take into account that the inputs of the next step are not those of the last one."""
+        return
 
     def take_event(self) -> StepEvent:
         """Return the event at which the last call stopped.
@@ -221,10 +222,8 @@ class ContinuousModel:
         name = self.functions[role]
         if not len(values) or (is_optional and name not in self.library):
             return lambda: None
-        function, arguments = (
-            self.library[name],
-            (self._instance, as_pointer(values.ctypes.data), as_size(len(values))),
-        )
+        function = self.library[name]
+        arguments = (self._instance, as_pointer(values.ctypes.data), as_size(len(values)))
 
         def call() -> None:
             status = function(*arguments)

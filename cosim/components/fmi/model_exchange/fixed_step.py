@@ -103,10 +103,8 @@ class FixedStepIntegrator(Integrator):
                 setattr(state, role, function_address(model.library[model.functions[role]]))
         state.states, state.derivatives = model.states.ctypes.data, model.derivatives.ctypes.data
         state.start_states, state.sum = self._start_states.ctypes.data, self._sum.ctypes.data
-        state.indicators, state.previous_indicators = (
-            model.indicators.ctypes.data,
-            self._previous_indicators.ctypes.data,
-        )
+        state.indicators = model.indicators.ctypes.data
+        state.previous_indicators = self._previous_indicators.ctypes.data
         inputs = model.linear_inputs
         state.reference_count, state.input_count = len(inputs.references), len(inputs.indices)
         for name in ("references", "array", "indices", "slopes", "values"):
@@ -141,9 +139,6 @@ class FixedStepIntegrator(Integrator):
         self._previous_indicators[:] = self._model.indicators
         self._state.next_event_time = next_event_time
         self._state.time = time
-
-    def inputs_changed(self) -> None:
-        """Do nothing: an explicit method has no history."""
 
     def take_event(self) -> StepEvent:
         """Return the event of the last call.
@@ -197,6 +192,9 @@ class FixedStepIntegrator(Integrator):
         model.set_states()
 
     def _runge_kutta_step(self, begin: float, end: float) -> None:
+        # The classical method of order 4: slopes k1 at the begin, k2 and k3 in the middle, k4 at the
+        # end of the step; each is evaluated at the start plus a weight times the slope before it.
+        # The step is size / 6 * (k1 + 2 k2 + 2 k3 + k4).
         model, size = self._model, self._state.substep_size
         model.get_derivatives()
         self._start_states[:], self._sum[:] = model.states, model.derivatives

@@ -213,10 +213,8 @@ class VariableStepIntegrator(Integrator):
         self._cvode = Cvode(
             self._states, derivatives, self._evaluate_indicators, len(model.indicators)
         )
-        self._set_states, self._get_derivatives = (
-            self._transfer("set_states"),
-            self._transfer("get_derivatives"),
-        )
+        self._set_states = self._transfer("set_states")
+        self._get_derivatives = self._transfer("get_derivatives")
         self._get_indicators = self._transfer("get_indicators")
 
     def _transfer(self, role: str) -> Callable[[int], None]:
@@ -224,10 +222,8 @@ class VariableStepIntegrator(Integrator):
         model = self._model
         if not model.is_called(role):
             return lambda _: None
-        name, count = (
-            model.functions[role],
-            len(model.indicators if role == "get_indicators" else model.states),
-        )
+        name = model.functions[role]
+        count = len(model.indicators if role == "get_indicators" else model.states)
         function, instance, size = model.library[name], as_pointer(model.handle), as_size(count)
 
         def call(address: int) -> None:

@@ -228,6 +228,8 @@ class Archive:
 
         They reach from the start of the file to the central directory.
         """
+        # Members that share bytes make small archives expand without limit, and bytes that belong to
+        # no member can hide one that other programs read.
         end = 0
         for entry in sorted(self._entries, key=lambda entry: entry.offset):
             try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 
 from ....core.errors import abbreviate_names
@@ -61,15 +61,6 @@ def list_platforms(names: Iterable[str]) -> list[str]:
     return [*sorted(folders), *(["c-code"] if sources else [])]
 
 
-def can_be_compiled(platforms: Collection[str]) -> bool:
-    """Return whether an FMU without a binary for this machine has sources.
-
-    Args:
-        platforms: Result of `list_platforms`.
-    """
-    return "c-code" in platforms
-
-
 def check_binary(
     archive: Archive,
     model: ModelDescription,
@@ -97,7 +88,7 @@ def check_binary(
         names = (
             folder if folder == machine.platform_tuple else f"{machine.platform_tuple} ({folder})"
         )
-        if can_be_compiled(platforms):
+        if "c-code" in platforms:
             yield SOURCES_ONLY(
                 f"has no binary for {names}; its sources are compiled when it is used"
             )
@@ -150,10 +141,8 @@ def _check_library(
     except InvalidLibraryError as error:
         yield FORMAT(f"the library cannot be loaded: it {error}", member)
         return
-    called, identifier = (
-        called_functions(model, interface),
-        model.interfaces[interface]["modelIdentifier"],
-    )
+    called = called_functions(model, interface)
+    identifier = model.interfaces[interface]["modelIdentifier"]
     if missing := sorted(called - library.exports):
         yield FUNCTIONS(f"the library does not export {abbreviate_names(missing, limit=5)}", member)
     if unused := sorted(

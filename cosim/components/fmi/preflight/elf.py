@@ -28,15 +28,13 @@ _MACHINE_NAMES = {
 _ELFDATA2LSB = 1
 _ET_DYN = 3
 _PT_LOAD, _PT_DYNAMIC = 1, 2
-_DT_NEEDED, _DT_HASH, _DT_STRTAB, _DT_SYMTAB, _DT_STRSZ, _DT_RPATH, _DT_RUNPATH = (
-    1,
-    4,
-    5,
-    6,
-    10,
-    15,
-    29,
-)
+_DT_NEEDED = 1
+_DT_HASH = 4
+_DT_STRTAB = 5
+_DT_SYMTAB = 6
+_DT_STRSZ = 10
+_DT_RPATH = 15
+_DT_RUNPATH = 29
 _DT_GNU_HASH = 0x6FFFFEF5
 _STB_LOCAL = 0
 _STV_DEFAULT, _STV_PROTECTED = 0, 3
@@ -223,6 +221,9 @@ class _ElfReader:
 
     def _gnu_symbol_count(self, offset: int) -> int:
         """Return one more than the largest symbol index in the chains of a GNU hash table."""
+        # The table has no number of symbols. Each bucket holds the first symbol of a chain, and the
+        # chain ends with a hash whose lowest bit is set: the end of the chain with the largest first
+        # symbol is the last symbol.
         nbuckets, symoffset, bloom_size, _ = self.unpack("4L", offset)
         if nbuckets > _MAX_SYMBOLS or bloom_size > _MAX_SYMBOLS:
             raise InvalidLibraryError(f"is damaged: it claims {nbuckets} hash buckets")

@@ -325,10 +325,8 @@ def _is_computed(variable: ModelVariable) -> bool:
 def _check_list(
     rule: Rule, role: str, listed: list[ModelVariable], expected: list[ModelVariable]
 ) -> Iterator[Finding]:
-    listed_lines, expected_lines = (
-        {v.name: v.line for v in listed},
-        {v.name: v.line for v in expected},
-    )
+    listed_lines = {v.name: v.line for v in listed}
+    expected_lines = {v.name: v.line for v in expected}
     for name in (name for name in expected_lines if name not in listed_lines):
         text = (
             f'variable "{name}": is an {role} but is missing in the {role}s of the model structure'

@@ -198,10 +198,8 @@ def _read_entry(directory: bytes, position: int) -> tuple[ZipEntry, int]:
     end = extra_begin + extra_size + comment_size
     if end > len(directory):
         raise _damaged_directory_error(position)
-    name, extra = (
-        directory[name_begin:extra_begin],
-        directory[extra_begin : extra_begin + extra_size],
-    )
+    name = directory[name_begin:extra_begin]
+    extra = directory[extra_begin : extra_begin + extra_size]
     size, compressed, offset = _apply_zip64(extra, size, compressed, offset)
     return ZipEntry(name, flags, method, crc, compressed, size, attributes >> 16, offset), end
 

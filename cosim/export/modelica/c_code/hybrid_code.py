@@ -17,6 +17,7 @@ from ..causality.hybrid import (
     iterated_names,
 )
 from ..model.flat_model import (
+    Hybrid,
     Model,
     Relation,
     derivative_name,
@@ -35,20 +36,23 @@ from .statement_lowering import StatementLowering
 class HybridCode(ModelCode):
     """Code generator of model.c for a model with event iteration."""
 
+    @property
+    def _hybrid(self) -> Hybrid:
+        assert self.model.hybrid
+        return self.model.hybrid
+
     def headers(self) -> list[str]:
         """Return the names of the C headers that model.c includes besides model.h and runtime.h."""
-        assert self.model.hybrid
         others = [name for name in super().headers() if name != "runge_kutta.h"]
         return [
             *others,
-            *["past.h"] * bool(self.model.hybrid.delays),
+            *["past.h"] * bool(self._hybrid.delays),
             *["hybrid.h"] * is_integrated(self.model),
         ]
 
     def definitions(self) -> list[str]:
         """Generate the functions of model.c."""
         model, clocks = self.model, len(self.schedule.clocks)
-        assert model.hybrid
         values = self._make_lowering().scope
         initial = self._body(self.schedule.initialization, initial=True)
         definitions = [
@@ -64,7 +68,7 @@ class HybridCode(ModelCode):
         ]
         if is_integrated(model):
             definitions += [*self._hybrid_system(values)]
-        step = hybrid_step_body(clocks, is_integrated(model), bool(model.hybrid.sampled))
+        step = hybrid_step_body(clocks, is_integrated(model), bool(self._hybrid.sampled))
         return [
             *definitions,
             function_definition(
@@ -72,14 +76,13 @@ class HybridCode(ModelCode):
             ),
             *self._exchange(
                 f"event(m, time, {'tick ? due : ' * bool(clocks)}NO_TICK);",
-                record=bool(model.hybrid.delays),
+                record=bool(self._hybrid.delays),
             ),
         ]
 
     def _endless_codes(self) -> dict[str, str]:
         """Return variable -> failure code of an event iteration that it does not let end."""
-        hybrid, variables = self.model.hybrid, self.model.variables
-        assert hybrid
+        hybrid, variables = self._hybrid, self.model.variables
         names = iterated_names(hybrid)
         return {
             name: self._failure_code(endless_reason(hybrid, name), variables[name].where)
@@ -91,22 +94,14 @@ class HybridCode(ModelCode):
 
         The initial equations, repeated until relations are consistent, and an event.
         """
-        past = (
-            ["memset(m->past, 0, sizeof m->past);"]
-            if self.model.hybrid and self.model.hybrid.delays
-            else []
-        )
+        past = ["memset(m->past, 0, sizeof m->past);"] if self._hybrid.delays else []
         return [
             "m->failure = 0;",
             *(["m->step = 0;"] if is_integrated(self.model) else []),
             *past,
             "start_variables(m);",
             *self._clock_lines(),
-            *(
-                ["m->event_time = -INFINITY;"]
-                if self.model.hybrid and self.model.hybrid.sampled
-                else []
-            ),
+            *(["m->event_time = -INFINITY;"] if self._hybrid.sampled else []),
             "for (int pass = 0; initialize(m, time); pass++) {",
             f"    if (pass == {MAX_PASSES}) fail(m, endless(m));",
             *(f"    {line}" for line in self._copy_relations()),
@@ -123,10 +118,9 @@ class HybridCode(ModelCode):
 
         Values that are needed nowhere else are local variables.
         """
-        assert self.model.hybrid
         stored = {
-            *self.model.hybrid.remembered,
-            *(delay.name for delay in self.model.hybrid.delays),
+            *self._hybrid.remembered,
+            *(delay.name for delay in self._hybrid.delays),
         }
         stored |= {derivative_name(name) for name in self.model.states}
         body = self.schedule.between.derivatives
@@ -173,19 +167,17 @@ class HybridCode(ModelCode):
 
     def _copy_relations(self) -> list[str]:
         values = self._make_lowering().scope
-        assert self.model.hybrid
-        names = [relation.name for relation in self.model.hybrid.relations]
+        names = [relation.name for relation in self._hybrid.relations]
         return copy_values((values[previous_name(name)], values[name]) for name in names)
 
     def _chattering_codes(self) -> list[str]:
-        relations = self.model.hybrid.relations if self.model.hybrid else ()
+        relations = self._hybrid.relations
         return [
             self._failure_code(chattering_reason(each), each.condition.where) for each in relations
         ]
 
     def _hybrid_system(self, values: Mapping[str, CValue]) -> list[str]:
         """Generate the functions for the integration between events."""
-        assert self.model.hybrid
         lowering = self._make_lowering()
         lowering.body(self.schedule.between.indicators)
         states, rates = (
@@ -199,7 +191,7 @@ class HybridCode(ModelCode):
                 "static void derivatives(Model *m, double time)",
                 self._derivatives(),
             ),
-            crossing_function(self.model.hybrid.relations, values, lowering),
+            crossing_function(self._hybrid.relations, values, lowering),
             (
                 "static const int32_t CHATTERING[] = {0, "
                 f"{', '.join(self._chattering_codes()) or 0}}};"

@@ -33,7 +33,7 @@ from cosim.components.fmi.isolated.shared_memory import SharedMemoryBlock
 from cosim.components.fmi.isolated.worker_process import WorkerLostError, WorkerProcess
 from cosim.core.component import Ports, Variable
 from cosim.core.time_grid import exact_fraction
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 from cosim.process.journal import CHANGE_COUNT
 
@@ -251,7 +251,7 @@ sys.path.insert(0, sys.argv[1])
 from systems import make_system
 from pathlib import Path
 from cosim.components.fmi import FmuFile, Isolation, create_component
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 from cosim.core.time_grid import exact_fraction
 def killed(n, count):

@@ -22,7 +22,7 @@ from cosim.components.fmi import (
     model_exchange,
 )
 from cosim.core.errors import InputError
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 
 #: functions of ball.c by their number, with their names in FMI 1.0, 2.0 and 3.0; "" if the version

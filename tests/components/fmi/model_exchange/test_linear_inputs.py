@@ -20,7 +20,7 @@ from cosim.components.fmi import (
 )
 from cosim.components.fmi.model_exchange import fixed_step
 from cosim.core.system import Connection, System
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
 
 pytestmark = pytest.mark.usefixtures("executor")

@@ -22,7 +22,7 @@ from cosim.core.component import Variable
 from cosim.core.errors import ComponentError, InputError
 from cosim.core.system import Group, Iteration
 from cosim.core.time_grid import exact_fraction
-from cosim.engine.run_loop import simulate
+from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Event, Settings
 
 pytestmark = pytest.mark.usefixtures("executor")

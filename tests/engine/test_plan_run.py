@@ -18,8 +18,8 @@ from cosim.core.component import StepResult, Variable
 from cosim.core.errors import ComponentError, InputError
 from cosim.core.time_grid import exact_fraction
 from cosim.engine.plan import compile_plan
+from cosim.engine.plan_run import simulate
 from cosim.engine.recorder import find_space_problems
-from cosim.engine.run_loop import simulate
 from cosim.engine.settings import Event, Settings
 from cosim.process.float_mode import enabled_traps, is_changed
 
