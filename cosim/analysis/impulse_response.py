@@ -52,8 +52,8 @@ def realize(
             much; at most 0.001 counts.
     """
     # The Hankel matrix of a linear system is the product of what the outputs show of a state and of
-    # how the inputs reach it. A singular value decomposition splits it into both factors; the number
-    # of singular values that are kept is the order. The matrix shifted by one sample gives A.
+    # how the inputs reach it. A singular value decomposition splits it into both factors; the
+    # number of kept singular values is the order. The matrix shifted by one sample gives A.
     rows, columns = _scales(response)
     scaled = response / rows[:, None] / columns
     lags = _lags(len(response))

@@ -210,10 +210,8 @@ def classify_source(path: Path, model: str | None = None) -> Source:
         return Source(path, SOURCE_KINDS[4], path.stem)
     raise InputError(
         Problem(
-            (
-                "cannot be exported; expected a .mo or .py file, a vehicle file (.json), or a C "
-                f"controller's {DESCRIPTION_FILE}"
-            ),
+            "cannot be exported; expected a .mo or .py file, a vehicle file (.json), or a C "
+            f"controller's {DESCRIPTION_FILE}",
             str(path),
         )
     )

@@ -478,9 +478,8 @@ class SystemFile:
         port = re.split(r"[.\[]", rest, maxsplit=1)[0]
         if port:
             return targets[port] if port in targets else child._count_targets(rest, kinds)
-        return max(
-            1, *targets.values(), *(child._count_targets(inner, kinds) for inner in child.children)
-        )
+        inner_counts = [child._count_targets(inner, kinds) for inner in child.children]
+        return max([1, *targets.values(), *inner_counts])
 
     @cached_property
     def _targets_by_port(self) -> Mapping[Sequence[str], Mapping[str, int]]:

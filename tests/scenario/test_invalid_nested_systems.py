@@ -57,3 +57,10 @@ def test_a_nested_system_with_times_is_refused(folder):
         "$.stop_time: unknown key",
         "$.step_size: unknown key",
     ]
+
+
+def test_a_connection_to_a_whole_system_without_ports_is_refused(folder):
+    system = {"system": {"components": {"g": folder.block("Gain")}}}
+    components = {"a": system, "b": folder.block("Gain")}
+    (line,) = folder.problems(components, [connection("b.y", "a")])
+    assert '"a" names a nested system, expected one of its ports' in line

@@ -36,12 +36,6 @@ def generate_c(
         for name in ("runtime.h", *code.headers())
     }
     model_c = code.model_c()
-    header = HeaderWriter(
-        analysed.model,
-        analysed.schedule,
-        analysed.parameter_roles,
-        sources,
-        len(code.functions.warnings),
-    )
+    header = HeaderWriter(analysed, sources, len(code.functions.warnings))
     external = external_files(code.functions.external_functions, packages or {})
     return {"model.c": model_c, "model.h": header.text(), **texts, **external}

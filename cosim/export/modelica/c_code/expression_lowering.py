@@ -171,10 +171,8 @@ class ExpressionLowering(BuiltinLowering):
     ) -> CValue:
         if left.shape and right.shape and left.shape != right.shape:
             raise_model_error(
-                (
-                    f"the operands are arrays of different sizes: {list(left.shape)} and "
-                    f"{list(right.shape)}"
-                ),
+                f"the operands are arrays of different sizes: {list(left.shape)} and "
+                f"{list(right.shape)}",
                 where,
             )
         if bool(left.shape) != bool(right.shape):
@@ -194,10 +192,8 @@ class ExpressionLowering(BuiltinLowering):
         inner = left.shape[-1]
         if inner != right.shape[0]:
             raise_model_error(
-                (
-                    f"arrays of the sizes {list(left.shape)} and {list(right.shape)} cannot be "
-                    "multiplied"
-                ),
+                f"arrays of the sizes {list(left.shape)} and {list(right.shape)} cannot be "
+                "multiplied",
                 where,
             )
         left, right = self.evaluated_once(left), self.evaluated_once(right)

@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..causality.analysed_model import ParameterRoles
-from ..causality.computation_order import Schedule
+from ..causality.analysed_model import AnalysedModel
 from ..model.flat_model import Model, Variable, derivative_name, is_input, is_integrated
 from ..model.traversal import composed_asserts, has_terminate
 from .c_values import C_TYPES, CValue, c_identifier, variable_value
@@ -49,13 +48,16 @@ def struct_member(variable: Variable, name: str) -> CValue:
 class HeaderWriter:
     """Code generator of model.h."""
 
-    model: Model
-    schedule: Schedule
-    roles: ParameterRoles
+    analysed: AnalysedModel
     #: names of the Modelica files, for a comment
     sources: Sequence[str]
     #: number of assertions with the level warning
     warnings: int
+
+    @property
+    def model(self) -> Model:
+        """Flat model."""
+        return self.analysed.model
 
     def text(self) -> str:
         """Return the text of model.h."""
@@ -130,10 +132,11 @@ class HeaderWriter:
         ]
 
     def _struct(self) -> Iterator[str]:
+        roles, schedule = self.analysed.parameter_roles, self.analysed.schedule
         sections: dict[str, Callable[[Variable], bool]] = {
-            "parameters": lambda v: v.name in self.roles.settable,
-            "dependent parameters": lambda v: v.name in self.roles.dependent,
-            "constants": lambda v: v.name in self.roles.fixed,
+            "parameters": lambda v: v.name in roles.settable,
+            "dependent parameters": lambda v: v.name in roles.dependent,
+            "constants": lambda v: v.name in roles.fixed,
             "inputs": is_input,
             "outputs": lambda v: v.causality == "output" and v.top_level,
             "continuous states": lambda v: v.name in self.model.states,
@@ -151,9 +154,9 @@ class HeaderWriter:
                 for variable in section
             )
         yield "/* internal data */"
-        yield from [f"Clock clock[{len(self.schedule.clocks)}];"] * bool(self.schedule.clocks)
-        yield from [f"bool held[{self.schedule.edge_detector_count}];"] * bool(
-            self.schedule.edge_detector_count
+        yield from [f"Clock clock[{len(schedule.clocks)}];"] * bool(schedule.clocks)
+        yield from [f"bool held[{schedule.edge_detector_count}];"] * bool(
+            schedule.edge_detector_count
         )
         if self.model.hybrid:
             yield from [f"Past past[{len(self.model.hybrid.delays)}];"] * bool(

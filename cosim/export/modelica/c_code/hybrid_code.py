@@ -180,10 +180,7 @@ class HybridCode(ModelCode):
         """Generate the functions for the integration between events."""
         lowering = self._make_lowering()
         lowering.body(self.schedule.between.indicators)
-        states, rates = (
-            self._element_pointers(self.model.states),
-            self._element_pointers(map(derivative_name, self.model.states)),
-        )
+        states, rates = self._state_pointers()
         if not self.model.states:
             states, rates = ["&m->no_state[0]"], ["&m->no_state[1]"]
         return [

@@ -74,11 +74,6 @@ class ModelCode:
         self.members = struct_members(self.model)
         self.functions = FunctionTranslator(dict(self.model.functions), self._failure_code)
 
-    @property
-    def has_messages(self) -> bool:
-        """True if messages are composed at run time."""
-        return has_messages(self.model)
-
     def model_c(self) -> str:
         """Return the text of model.c."""
         includes = "\n".join(
@@ -94,7 +89,7 @@ class ModelCode:
         )
         reason = (
             "m->failure == COMPOSED_REASON ? m->reason : REASONS[m->failure]"
-            if self.has_messages
+            if has_messages(self.model)
             else "REASONS[m->failure]"
         )
         if not self.functions.external_functions:
@@ -114,7 +109,7 @@ class ModelCode:
         )
         solved = any(isinstance(item, Solve) for item in walk(bodies))
         return [
-            *["messages.h"] * self.has_messages,
+            *["messages.h"] * has_messages(self.model),
             *["newton.h"] * solved,
             *["runge_kutta.h"] * bool(self.model.states),
         ]
@@ -289,10 +284,7 @@ class ModelCode:
             return []
         lines = self._body(self.schedule.between.derivatives, initial=False)
         unused = [] if uses_variable("time", lines) else ["(void)time;"]
-        states, rates = (
-            self._element_pointers(self.model.states),
-            self._element_pointers(map(derivative_name, self.model.states)),
-        )
+        states, rates = self._state_pointers()
         system = [
             "const System system = {",
             f"    {{{', '.join(states)}}},",
@@ -321,13 +313,15 @@ class ModelCode:
                 *indicator_lines(self.model.hybrid.relations, self._make_lowering()),
                 "}",
             ]
-        states, rates = (
-            self._element_pointers(self.model.states),
-            self._element_pointers(map(derivative_name, self.model.states)),
-        )
+        states, rates = self._state_pointers()
         return exchange_functions(
             continuous, states, rates, len(self.schedule.clocks), event, record
         )
+
+    def _state_pointers(self) -> tuple[list[str], list[str]]:
+        """Return C pointers to all states and to their derivatives."""
+        rates = map(derivative_name, self.model.states)
+        return self._element_pointers(self.model.states), self._element_pointers(rates)
 
     def _element_pointers(self, names: Iterable[str]) -> list[str]:
         """Return C pointers to all elements of variables."""

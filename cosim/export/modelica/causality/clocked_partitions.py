@@ -7,7 +7,7 @@ sets at a tick; the clocked equations remain equations.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
@@ -19,6 +19,7 @@ from ..model.flat_model import (
     Model,
     Variable,
     internal_variable,
+    is_continuous,
     is_input,
 )
 from ..model.syntax_tree import (
@@ -338,18 +339,8 @@ class JumpSearch:
                 pending += self._equations.get(name, ())
 
     def _jumps(self, tree: Any) -> bool:
-        names = variable_names(tree) - self._ends
-        discrete = any(
-            name in self._assigned or _is_discrete(name, self._model.variables) for name in names
-        )
-        return (
-            discrete
-            or has_builtin(tree, *_JUMPING)
-            or any(isinstance(item, If) for item in walk(tree))
-        )
-
-
-def _is_discrete(name: str, variables: Mapping[str, Any]) -> bool:
-    return name in variables and (
-        variables[name].type != "Real" or variables[name].variability != "continuous"
-    )
+        variables = self._model.variables
+        for name in variable_names(tree) - self._ends:
+            if name in self._assigned or (name in variables and not is_continuous(variables[name])):
+                return True
+        return has_builtin(tree, *_JUMPING) or any(isinstance(item, If) for item in walk(tree))

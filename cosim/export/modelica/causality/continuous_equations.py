@@ -191,17 +191,13 @@ def _raise_unmatched(
         sides = [side for each in equations for side in (each.left, each.right)]
         names = ", ".join(sorted({side.name for side in sides if isinstance(side, Name)}))
         raise_model_error(
-            (
-                "these variables are only connected to each other, no equation gives them a "
-                f"value: {names}"
-            ),
+            "these variables are only connected to each other, no equation gives them a "
+            f"value: {names}",
             equation.where,
         )
     raise_model_error(
-        (
-            "this equation defines no variable: one side must be a variable, or der() of one, that "
-            "no other equation defines"
-        ),
+        "this equation defines no variable: one side must be a variable, or der() of one, that "
+        "no other equation defines",
         equation.where,
     )
 
@@ -238,10 +234,8 @@ def _initial_assignment(model: Model, equation: Equation, assigned: Collection[s
             assignments.append(Assign(target, other, equation.where))
     if not assignments:
         raise_model_error(
-            (
-                "one side of an initial equation must be a continuous state, or a variable that a "
-                "when-clause assigns"
-            ),
+            "one side of an initial equation must be a continuous state, or a variable that a "
+            "when-clause assigns",
             equation.where,
         )
     return assignments[0]

@@ -23,6 +23,7 @@ from ..model.flat_model import (
     derivative_name,
     given_variables,
     internal_variable,
+    is_continuous,
     is_input,
 )
 from ..model.scalars import ScalarKey, scalar_keys
@@ -80,10 +81,8 @@ def _der_argument(call: Builtin) -> Name | Index:
         or (isinstance(argument, Index) and isinstance(argument.base, Name))
     ):
         raise_model_error(
-            (
-                "der() of an expression is not supported; declare a variable x for the expression "
-                "and use der(x)"
-            ),
+            "der() of an expression is not supported; declare a variable x for the expression "
+            "and use der(x)",
             call.where,
         )
     return argument
@@ -91,12 +90,7 @@ def _der_argument(call: Builtin) -> Name | Index:
 
 def _check_state(model: Model, name: str, call: Builtin) -> None:
     variable = model.variables.get(name)
-    if (
-        variable is None
-        or variable.type != "Real"
-        or variable.variability != "continuous"
-        or is_input(variable)
-    ):
+    if variable is None or not is_continuous(variable) or is_input(variable):
         raise_model_error(
             f"der({name}): {name} is not a continuous Real variable of the model", call.where
         )
@@ -224,12 +218,7 @@ class _Reduction:
         if name == "time":
             return Literal(1.0, "Real")
         variable = self._variables.get(name)
-        if (
-            variable is None
-            or variable.type != "Real"
-            or variable.variability != "continuous"
-            or name in self._assigned
-        ):
+        if variable is None or not is_continuous(variable) or name in self._assigned:
             return None
         if is_input(variable):
             raise_model_error(

@@ -184,10 +184,8 @@ class EquationSystem:
         if discrete := [key for key in keys if self._is_discrete(key)]:
             chain = ", ".join(sorted({name for name, _ in keys}))
             raise_model_error(
-                (
-                    f"algebraic loop with the discrete variable {discrete[0][0]}: {chain}; break "
-                    "it with pre()"
-                ),
+                f"algebraic loop with the discrete variable {discrete[0][0]}: {chain}; break "
+                "it with pre()",
                 self._scalar[numbers[0]].where,
             )
         return self._continued([self._scalar[number] for number in numbers], keys)

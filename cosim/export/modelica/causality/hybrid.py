@@ -38,6 +38,7 @@ from ..model.flat_model import (
     Relation,
     Variable,
     internal_variable,
+    is_continuous,
     is_input,
     previous_name,
 )
@@ -83,11 +84,7 @@ class _Preparation:
         self._model = model
         self._assigned = assigned_names((model.whens, model.algorithms))
         self._discrete = self._assigned | model.initialized
-        self._discrete |= {
-            v.name
-            for v in model.variables.values()
-            if v.variability != "continuous" or v.type != "Real"
-        }
+        self._discrete |= {v.name for v in model.variables.values() if not is_continuous(v)}
         self._variables: dict[str, Variable] = dict(model.variables)
         self._relations: list[Relation] = []
         self._delays: list[Delay] = []

@@ -103,24 +103,13 @@ def _augment(
             if key in owner:
                 queue.append(owner[key])
                 continue
-            _flip(key, start, reached_from, matched, owner)
-            return
-
-
-def _flip(
-    key: Key,
-    start: int,
-    reached_from: dict[Key, int],
-    matched: dict[int, Key],
-    owner: dict[Key, int],
-) -> None:
-    while True:
-        number = reached_from[key]
-        previous = matched.get(number)
-        matched[number], owner[key] = key, number
-        if number == start or previous is None:
-            return
-        key = previous
+            while True:  # exchange the assignments along the path
+                number = reached_from[key]
+                previous = matched.get(number)
+                matched[number], owner[key] = key, number
+                if number == start or previous is None:
+                    return
+                key = previous
 
 
 def strongly_connected_components(successors: Sequence[Collection[int]]) -> list[list[int]]:

@@ -65,10 +65,8 @@ class EquationSplitter:
         shape = max(shapes, key=len)
         if any(other and other != shape for other in shapes):
             raise_model_error(
-                (
-                    f"the sides of this equation have the sizes {list(shapes[0])} and "
-                    f"{list(shapes[1])}"
-                ),
+                f"the sides of this equation have the sizes {list(shapes[0])} and "
+                f"{list(shapes[1])}",
                 equation.where,
             )
         for position in product(*map(range, shape)):

@@ -106,10 +106,8 @@ def _add_files(function: Function, packages: Mapping[str, Path], files: dict[str
             if name in required:
                 places = ", ".join(map(str, folders)) or "no folder"
                 raise_model_error(
-                    (
-                        f'{function.name}: the file "{name}" of its Include annotation is not '
-                        f"found in {places}"
-                    ),
+                    f'{function.name}: the file "{name}" of its Include annotation is not '
+                    f"found in {places}",
                     function.where,
                 )
             continue

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,7 @@ def fold_constants(model: Model) -> Model:
     model. Protected and final parameters of discrete types that depend on them only are replaced
     too.
     """
-    model = _rewrite_model(_bind_parameters(model), _ShapeFolder(model).fold)
+    model = _rewrite_model(_bind_parameters(model), partial(_fold_size, model=model))
     structural = _structural_parameters(model)
     foldable = {
         v.name: v for v in model.variables.values() if not v.shape and _is_foldable(v, structural)
@@ -143,19 +144,14 @@ def _rewrite_model(model: Model, change: Any, names: Iterable[str] | None = None
     return replace(rewrite_sections(model, change), variables=variables)
 
 
-class _ShapeFolder:
-    """Replacement of `size()` of a variable by a number."""
-
-    def __init__(self, model: Model):
-        self._shapes = {v.name: v.shape for v in model.variables.values()}
-
-    def fold(self, node: Any) -> Any:
-        if not (is_call(node, "size") and isinstance(node.arguments[0], Name)):
-            return node
-        shape = self._shapes.get(node.arguments[0].name)
-        if shape is None or len(node.arguments) != 2 or not isinstance(node.arguments[1], Literal):
-            return node
-        return Literal(shape[int(node.arguments[1].number) - 1], "Integer")
+def _fold_size(node: Any, model: Model) -> Any:
+    """Replace `size()` of a variable by a number."""
+    if not (is_call(node, "size") and isinstance(node.arguments[0], Name)):
+        return node
+    variable = model.variables.get(node.arguments[0].name)
+    if variable is None or len(node.arguments) != 2 or not isinstance(node.arguments[1], Literal):
+        return node
+    return Literal(variable.shape[int(node.arguments[1].number) - 1], "Integer")
 
 
 def _structural_parameters(model: Model) -> set[str]:

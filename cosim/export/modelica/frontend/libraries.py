@@ -204,17 +204,13 @@ def _is_library(entry: Path) -> bool:
     if entry.suffix == ".mo":
         return (
             entry.name != _PACKAGE_FILE
-            and _FOLDER_NAME.fullmatch(_name_with_version(entry)) is not None
+            and _FOLDER_NAME.fullmatch(entry.name.removesuffix(".mo")) is not None
         )
     return (entry / _PACKAGE_FILE).is_file() and _FOLDER_NAME.fullmatch(entry.name) is not None
 
 
-def _name_with_version(path: Path) -> str:
-    return path.name.removesuffix(".mo")
-
-
 def _name_of(path: Path) -> str:
-    return _name_with_version(path).partition(" ")[0]
+    return path.name.removesuffix(".mo").partition(" ")[0]
 
 
 def _version_in_name(name: str) -> str:

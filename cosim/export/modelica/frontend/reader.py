@@ -186,10 +186,8 @@ class ModelReader(StatementReader):
             )
             if [e.left for e in equations] != [e.left for e in self._equation(node)]:
                 raise_model_error(
-                    (
-                        "this for-equation was not unrolled by the front end; write its equations "
-                        "one by one"
-                    ),
+                    "this for-equation was not unrolled by the front end; write its equations "
+                    "one by one",
                     self.locate(node),
                 )
             yield from equations
@@ -239,10 +237,8 @@ class ModelReader(StatementReader):
             return [(left, right)]
         if not (isinstance(right, Name) and right.name in records):
             raise_model_error(
-                (
-                    "a record can only be equated with a record variable; write one equation for "
-                    "each field"
-                ),
+                "a record can only be equated with a record variable; write one equation for "
+                "each field",
                 left.where,
             )
         return [
@@ -318,10 +314,8 @@ class ModelReader(StatementReader):
         base, bracket, subscripts = target.rpartition("[")
         if not bracket or base not in self.json["variables"]:
             raise_model_error(
-                (
-                    f'cannot assign "{target}" in a when-equation; write one equation for each '
-                    "variable"
-                ),
+                f'cannot assign "{target}" in a when-equation; write one equation for each '
+                "variable",
                 where,
             )
         numbers = subscripts.rstrip("]").split(",")

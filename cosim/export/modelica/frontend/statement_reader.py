@@ -74,10 +74,8 @@ class StatementReader(ExpressionReader):
         values = [self.read_field(call, name) for name in names]
         if any(name.startswith(f"{target}.") for name in variable_names(values)):
             raise_model_error(
-                (
-                    f"the new value of the record {target} reads its fields; assign to another "
-                    "record first"
-                ),
+                f"the new value of the record {target} reads its fields; assign to another "
+                "record first",
                 where,
             )
         return [

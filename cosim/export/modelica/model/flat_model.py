@@ -192,6 +192,11 @@ def is_integrated(model: Model) -> bool:
     return model.hybrid is not None and bool(model.states or model.hybrid.relations)
 
 
+def is_continuous(variable: Variable) -> bool:
+    """Return whether a variable is a Real that can change between events."""
+    return variable.type == "Real" and variable.variability == "continuous"
+
+
 def given_variables(model: Model) -> set[str]:
     """Return the constants, parameters and inputs, which no equation determines."""
     return {

@@ -1,4 +1,4 @@
-"""Runs in one process examine and extract an FMU once, and notice when its content changes."""
+"""FMU files: opened with a binary for this machine, examined and extracted once in a process."""
 
 import ctypes
 import os
@@ -10,6 +10,7 @@ import pytest
 
 import cosim
 from cosim.components.fmi import file as fmu_file
+from cosim.components.fmi import open_fmu
 
 
 @pytest.fixture
@@ -97,3 +98,27 @@ def test_a_library_that_stays_loaded_is_loaded_from_another_folder(fmu):
         kept = ctypes.CDLL(library)
     assert idle_folder(fmu) is None
     assert kept
+
+
+def test_an_fmu_with_a_binary_is_opened_as_it_is(fmu):
+    opened = open_fmu(fmu, None, lambda _: pytest.fail("nothing has to be added"))
+    assert (opened.path, opened.has_binary) == (fmu, True)
+
+
+@pytest.mark.parametrize("is_possible", [True, False])
+def test_an_fmu_without_a_binary_is_replaced_by_a_copy_that_has_one(fmu, tmp_path, is_possible):
+    bare = tmp_path / "bare.fmu"
+    with ZipFile(fmu) as whole, ZipFile(bare, "w") as part:
+        for name in whole.namelist():
+            if not name.startswith("binaries/"):
+                part.writestr(name, whole.read(name))
+    asked = []
+
+    def add_binary(file):
+        asked.append(file.path)
+        return fmu if is_possible else None
+
+    opened = open_fmu(bare, "co-simulation", add_binary)
+    assert asked == [bare]
+    assert opened.path == (fmu if is_possible else bare)
+    assert opened.description.interface == "co-simulation"
