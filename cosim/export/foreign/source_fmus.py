@@ -6,6 +6,7 @@ They are compiled when they are used, into the user's cache (see `add_binary`).
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -47,7 +48,7 @@ _WINDOWS_HEADERS = {
 #: headers of FMI 1.0, which FMPy does not contain
 _FMI1_HEADERS = ("fmiFunctions.h", "fmiModelFunctions.h", "fmiPlatformTypes.h", "fmiModelTypes.h")
 #: words of the compiler's lines that state a cause
-_ERROR_WORDS = ("error:", "Error:", "undefined reference", "multiple definition", "syntax error")
+_ERROR = re.compile("[eE]rror:|undefined reference|multiple definition|syntax error")
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,11 +139,7 @@ def _compile_library(
     )
     if process.returncode:
         lines = [line.replace(f"{sources}/", "") for line in process.stderr.splitlines()]
-        errors = [
-            line
-            for line in lines
-            if any(words in line for words in _ERROR_WORDS) and "ld returned" not in line
-        ]
+        errors = [line for line in lines if _ERROR.search(line) and "ld returned" not in line]
         more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
         raise InputError(
             f'the sources of "{file.path}" cannot be compiled: '
