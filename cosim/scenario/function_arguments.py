@@ -165,13 +165,12 @@ class FunctionResolver:
         return self._resolve_name(value["from"])
 
     def _resolve_name(self, name: str) -> Any:
-        return self._value_at(name) if name.startswith("/") else self._value_of(name)
-
-    def _value_at(self, pointer: str) -> Any:
-        keys = pointer_keys(pointer)
+        if not name.startswith("/"):
+            return self._value_of(name)
+        keys = pointer_keys(name)
         value, depth = find_value(self.root.document.value, keys)
         if depth < len(keys):
-            raise UnknownNameError(missing_value(self.root.document.value, pointer))
+            raise UnknownNameError(missing_value(self.root.document.value, name))
         return value
 
     def _value_of(self, name: str) -> Any:
@@ -179,9 +178,7 @@ class FunctionResolver:
 
         A port of a nested system has that of its first inner variable.
         """
-        target = next(
-            iter(resolve_name(self.root, name, ("parameters", "inputs"), include_inner=True))
-        )
+        target, *_ = resolve_name(self.root, name, ("parameters", "inputs"), include_inner=True)
         if target.component not in self.components:
             raise UnknownNameError
         variables = {
