@@ -17,7 +17,7 @@ from pathlib import Path
 
 from ....core.errors import InputError, nearest_file
 from . import zip_format
-from .findings import FatalFindingError, Finding, PreflightLimits, Rule
+from .findings import FatalFindingError, Finding, Rule
 from .zip_format import ZipEntry
 
 _ZIP = "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5"
@@ -165,6 +165,10 @@ DATA = Rule("archive.data", "APPNOTE 4.3.8")
 #: largest size of the data descriptor behind a member's data (APPNOTE 4.3.9, bytes)
 _MAX_DATA_DESCRIPTOR_SIZE = 24
 _CHUNK_SIZE = 1 << 16
+#: largest total extracted size (bytes)
+MAX_EXPANDED_SIZE = 1 << 30
+#: largest ratio of extracted to compressed size, for members larger than `RATIO_THRESHOLD` (bytes)
+MAX_RATIO, RATIO_THRESHOLD = 200, 1 << 24
 
 
 class Archive:
@@ -177,21 +181,18 @@ class Archive:
         findings: Findings about the headers.
     """
 
-    def __init__(self, file: BufferedReader, limits: PreflightLimits):
+    def __init__(self, file: BufferedReader):
         """Read and check the headers.
 
         Args:
             file: The archive.
-            limits: Limits of the check.
 
         Raises:
             FatalFindingError: The file is not an archive.
         """
-        entries, self._directory_offset = zip_format.read_central_directory(
-            file, limits.max_members
-        )
-        self._file, self._limits, self._entries = file, limits, entries
-        self.members = {entry.decoded_name: entry for entry in entries}
+        self._file = file
+        self._entries, self._directory_offset = zip_format.read_central_directory(file)
+        self.members = {entry.decoded_name: entry for entry in self._entries}
         self._data_offsets: dict[int, int] = {}
         self.findings: Sequence[Finding] = list(self._check_entries())
 
@@ -203,23 +204,18 @@ class Archive:
             [(entry.decoded_name, (entry.crc, entry.size)) for entry in self._entries]
         )
         total = sum(entry.size for entry in self._entries)
-        if total > self._limits.max_expanded_size:
-            yield SIZE(
-                f"expands to {total} bytes, expected at most {self._limits.max_expanded_size}"
-            )
+        if total > MAX_EXPANDED_SIZE:
+            yield SIZE(f"expands to {total} bytes, expected at most {MAX_EXPANDED_SIZE}")
         yield from self._check_offsets()
 
     def _check_size(self, entry: ZipEntry) -> Iterator[Finding]:
         if entry.method == STORED and entry.size != entry.compressed_size:
             text = f"is stored in {entry.compressed_size} bytes but has a size of {entry.size}"
             yield SIZE(text, entry.decoded_name)
-        elif entry.size > max(
-            self._limits.ratio_threshold, self._limits.max_ratio * entry.compressed_size
-        ):
-            times = self._limits.max_ratio
+        elif entry.size > max(RATIO_THRESHOLD, MAX_RATIO * entry.compressed_size):
             text = (
-                f"{entry.compressed_size} bytes expand to {entry.size}, expected at most {times} "
-                "times as many"
+                f"{entry.compressed_size} bytes expand to {entry.size}, expected at most "
+                f"{MAX_RATIO} times as many"
             )
             yield SIZE(text, entry.decoded_name)
 

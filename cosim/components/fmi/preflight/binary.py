@@ -9,7 +9,7 @@ from pathlib import Path
 from ....core.errors import abbreviate_names
 from . import elf, macho, pe
 from .archive import Archive
-from .findings import Finding, PreflightLimits, Rule, escape_unprintable
+from .findings import Finding, Rule, escape_unprintable
 from .functions import called_functions, standard_functions
 from .model_description import Interface, ModelDescription
 from .platforms import EXPECTED_TEXTS, FmuPlatform, InvalidLibraryError, SharedLibrary
@@ -27,6 +27,8 @@ SIZE = Rule("binary.size", "limits")
 NEEDED = Rule("binary.needed", _BINARIES, "warning")
 VERSION = Rule("binary.version", "FMI 2.0.5 section 2.1.4, FMI 3.0.2 section 2.2.4", "warning")
 
+#: largest size of the library for this platform (bytes), which is read into memory
+MAX_LIBRARY_SIZE = 1 << 28
 #: platform of the libraries that run under Wine
 WINDOWS = FmuPlatform("windows", "x86_64", ".dll")
 
@@ -66,7 +68,6 @@ def check_binary(
     model: ModelDescription,
     interface: Interface,
     machine: FmuPlatform,
-    limits: PreflightLimits,
 ) -> Iterator[Finding]:
     """Check the library for a platform.
 
@@ -77,7 +78,6 @@ def check_binary(
         model: Its model description.
         interface: Interface whose library is checked.
         machine: The platform.
-        limits: Limits of the preflight check.
 
     Raises:
         FatalFindingError: The data of the library are damaged.
@@ -117,11 +117,11 @@ def check_binary(
             name for name in archive.members if name.startswith(f"binaries/{folder}/")
         )
         yield PRESENT(f"the library cannot be loaded: {member} does not exist; found: {found}")
-    elif archive.members[member].size > limits.max_library_size:
+    elif archive.members[member].size > MAX_LIBRARY_SIZE:
         yield SIZE(
             (
                 f"the library has {archive.members[member].size} bytes, expected at most "
-                f"{limits.max_library_size}"
+                f"{MAX_LIBRARY_SIZE}"
             ),
             member,
         )

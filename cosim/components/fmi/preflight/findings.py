@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from ....core.errors import InputError
-from ....core.size_limits import MAX_SCALARS
-from ....core.text import MAX_TEXT_LENGTH, escape_control_characters
+from ....core.text import escape_control_characters
 
 Severity = Literal["error", "warning"]
 DESCRIPTION_FILE = "modelDescription.xml"
@@ -95,31 +94,3 @@ def escape_unprintable(text: str, length: int = 300) -> str:
     """
     escaped = escape_control_characters(text[: length + 1])
     return escaped if len(escaped) <= length else escaped[: length - 3] + "..."
-
-
-@dataclass(frozen=True, slots=True)
-class PreflightLimits:
-    """Limits of the preflight check; an FMU that exceeds one of them is refused."""
-
-    #: number of files and folders in the archive
-    max_members: int = 10_000
-    #: total extracted size (bytes)
-    max_expanded_size: int = 1 << 30
-    #: largest ratio of extracted to compressed size, for members larger than `ratio_threshold`
-    #: (bytes)
-    max_ratio: int = 200
-    ratio_threshold: int = 1 << 24
-    #: size of the library for this platform (bytes), which is read into memory
-    max_library_size: int = 1 << 28
-    #: size of an XML file (bytes) and number of its tags
-    max_xml_size: int = 1 << 25
-    max_xml_tags: int = 1_000_000
-    #: length of one attribute or text in an XML file (characters)
-    max_text_length: int = MAX_TEXT_LENGTH
-    #: number of elements of one array variable
-    max_array_size: int = 1_000_000
-    #: number of variables, an array counted with all its elements
-    max_scalars: int = MAX_SCALARS
-
-
-DEFAULT_LIMITS = PreflightLimits()

@@ -27,6 +27,8 @@ _EOCD = struct.Struct("<4s4H2LH")
 _CENTRAL_HEADER, _LOCAL_HEADER = struct.Struct("<4s6H3L5H2L"), struct.Struct("<4s5H3L2H")
 _EOCD_SIGNATURE, _CENTRAL_SIGNATURE, _LOCAL_SIGNATURE = b"PK\x05\x06", b"PK\x01\x02", b"PK\x03\x04"
 _MAX_COMMENT_SIZE = 0xFFFF
+#: largest accepted number of files and folders in the archive
+MAX_MEMBERS = 10_000
 #: largest accepted mean size of a central directory header (bytes)
 _MAX_HEADER_SIZE = 4096
 #: value of a 32-bit field whose real value is in the ZIP64 extra field
@@ -78,12 +80,11 @@ class ZipEntry:
         return name.removeprefix("./") or name
 
 
-def read_central_directory(file: BufferedReader, max_entries: int) -> tuple[list[ZipEntry], int]:
+def read_central_directory(file: BufferedReader) -> tuple[list[ZipEntry], int]:
     """Read the central directory.
 
     Args:
         file: The archive.
-        max_entries: Largest accepted number of members.
 
     Returns:
         The headers of the members, and the offset of the central directory in the file (bytes).
@@ -93,15 +94,15 @@ def read_central_directory(file: BufferedReader, max_entries: int) -> tuple[list
             many members.
     """
     count, size, offset = _read_eocd(file)
-    if count > max_entries:
+    if count > MAX_MEMBERS:
         raise FatalFindingError(
-            CENTRAL_DIRECTORY(f"found {count} members, expected at most {max_entries}")
+            CENTRAL_DIRECTORY(f"found {count} members, expected at most {MAX_MEMBERS}")
         )
-    if size > max_entries * _MAX_HEADER_SIZE:
+    if size > MAX_MEMBERS * _MAX_HEADER_SIZE:
         raise FatalFindingError(
             CENTRAL_DIRECTORY(
                 f"found a central directory of {size} bytes, expected at most "
-                f"{max_entries * _MAX_HEADER_SIZE}"
+                f"{MAX_MEMBERS * _MAX_HEADER_SIZE}"
             )
         )
     file.seek(offset)
