@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from io import BufferedReader
 from itertools import islice, starmap
 from pathlib import Path
@@ -137,6 +136,14 @@ def extract(path: Path, examination: Examination, folder: Path) -> None:
     """
     assert examination.model is not None  # otherwise the FMU has errors and is not used
     binary_folder = current_platform().binary_folder(examination.model.major)
+
+    def is_used(name: str) -> bool:
+        """Return False for sources, documentation and binaries of other platforms."""
+        first, _, rest = name.partition("/")
+        return first not in _UNUSED_FOLDERS and (
+            first != "binaries" or rest.partition("/")[0] == binary_folder
+        )
+
     with open_regular_file(path) as file:
         try:
             if _file_identity(file) != examination.file_identity:
@@ -145,17 +152,9 @@ def extract(path: Path, examination: Examination, folder: Path) -> None:
                 )
             archive = Archive(file)
             raise_errors(path, archive.findings)
-            archive.extract(folder, partial(_is_used, binary_folder=binary_folder))
+            archive.extract(folder, is_used)
         except FatalFindingError as error:
             raise_errors(path, [error.finding])
-
-
-def _is_used(name: str, binary_folder: str) -> bool:
-    """Return False for sources, documentation and binaries of other platforms."""
-    first, _, rest = name.partition("/")
-    return first not in _UNUSED_FOLDERS and (
-        first != "binaries" or rest.partition("/")[0] == binary_folder
-    )
 
 
 def _file_identity(file: BufferedReader) -> tuple[int, ...]:

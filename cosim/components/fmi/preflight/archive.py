@@ -35,12 +35,6 @@ _FILE_TYPE_NAMES = {
 }
 
 
-def check_member(entry: ZipEntry) -> Iterator[Finding]:
-    """Check name, file type, encryption and compression method of a member."""
-    yield from _check_name(entry)
-    yield from _check_kind(entry)
-
-
 def file_type_name(mode: int) -> str:
     """Return words for the file type in a Unix file mode, for a message "NAME is ..."."""
     letter = stat.filemode(mode)[0]
@@ -49,7 +43,7 @@ def file_type_name(mode: int) -> str:
 
 def _check_name(entry: ZipEntry) -> Iterator[Finding]:
     name = entry.decoded_name
-    if entry.flags & zip_format.UTF8 and not _is_utf8(entry.name):
+    if entry.flags & zip_format.UTF8 and entry.raw_name.encode() != entry.name:
         yield Finding("archive.name", "its name is marked as UTF-8 but is not UTF-8", name)
     if not name.isprintable():
         yield Finding(
@@ -89,15 +83,8 @@ def _check_name(entry: ZipEntry) -> Iterator[Finding]:
         )
 
 
-def _is_utf8(name: bytes) -> bool:
-    try:
-        name.decode()
-    except UnicodeDecodeError:
-        return False
-    return True
-
-
 def _check_kind(entry: ZipEntry) -> Iterator[Finding]:
+    """Check file type, encryption and compression method of a member."""
     name, is_folder = entry.decoded_name, entry.decoded_name.endswith("/")
     # some tools give folders the mode of a file, so only the name decides which members become
     # folders
@@ -210,7 +197,8 @@ class Archive:
 
     def _check_entries(self) -> Iterator[Finding]:
         for entry in self._entries:
-            yield from check_member(entry)
+            yield from _check_name(entry)
+            yield from _check_kind(entry)
             yield from self._check_size(entry)
         yield from check_collisions(
             [(entry.decoded_name, (entry.crc, entry.size)) for entry in self._entries]
@@ -238,8 +226,8 @@ class Archive:
 
         They reach from the start of the file to the central directory.
         """
-        # Members that share bytes make small archives expand without limit, and bytes that belong to
-        # no member can hide one that other programs read.
+        # Members that share bytes make small archives expand without limit, and bytes that belong
+        # to no member can hide one that other programs read.
         end = 0
         for entry in sorted(self._entries, key=lambda entry: entry.offset):
             try:

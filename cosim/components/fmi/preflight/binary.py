@@ -192,15 +192,9 @@ def _is_library_found(name: str, library: SharedLibrary, archive: Archive, membe
         return True
     folders = [folder for folder in library.search_folders if folder.startswith("/")]
     folders += [folder for folder in os.environ.get("LD_LIBRARY_PATH", "").split(":") if folder]
-    return any((Path(folder) / name).is_file() for folder in folders) or _is_in_loader_cache(name)
-
-
-def _is_in_loader_cache(name: str) -> bool:
-    """Return whether the loader's cache contains a library.
-
-    True on systems without such a cache.
-    """
+    if any((Path(folder) / name).is_file() for folder in folders):
+        return True
     try:
         return name.encode() + b"\0" in Path("/etc/ld.so.cache").read_bytes()
-    except OSError:
+    except OSError:  # a system without such a cache
         return True

@@ -16,7 +16,6 @@ from .model_description import (
     ModelDescription,
     ModelVariable,
     TypeDefinition,
-    UnitDefinition,
     Unknown,
     Violation,
     parse_float,
@@ -62,15 +61,11 @@ def check_units(model: ModelDescription) -> Iterator[Violation]:
     for name, line in _find_duplicates((unit.name, unit.line) for unit in model.units):
         yield "unit.unique", line, f'the unit "{name}" is defined twice'
     for unit in model.units:
-        yield from _check_unit_base(unit)
-
-
-def _check_unit_base(unit: UnitDefinition) -> Iterator[Violation]:
-    for name, text in (unit.base_unit or {}).items():
-        if not _is_valid_base_unit_value(name, text):
-            expected = "an integer" if name in BASE_UNITS else "a finite number, a factor not 0"
-            text = f'unit "{unit.name}": found {name}="{text}", expected {expected}'
-            yield "unit.base", unit.line, text
+        for name, text in (unit.base_unit or {}).items():
+            if not _is_valid_base_unit_value(name, text):
+                expected = "an integer" if name in BASE_UNITS else "a finite number, a factor not 0"
+                text = f'unit "{unit.name}": found {name}="{text}", expected {expected}'
+                yield "unit.base", unit.line, text
 
 
 def _is_valid_base_unit_value(name: str, text: str) -> bool:
@@ -216,19 +211,19 @@ def check_completeness(model: ModelDescription) -> Iterator[Violation]:
     """Check that each list of the model structure contains exactly the required variables."""
     if model.major == 1:
         return  # it has no model structure
-    lists = {
-        element: _variables_in(model, element)
-        for element in ("Output", "ContinuousStateDerivative", "InitialUnknown")
-    }
+    derivatives = _variables_in(model, "ContinuousStateDerivative")
     outputs = [variable for variable in model.variables if variable.causality == "output"]
-    yield from _check_list("structure.outputs", "output", lists["Output"], outputs)
-    for variable in lists["ContinuousStateDerivative"]:
+    yield from _check_list("structure.outputs", "output", _variables_in(model, "Output"), outputs)
+    for variable in derivatives:
         if "derivative" not in variable.attributes:
             text = f"{variable}: is listed as derivative but has no attribute derivative"
             yield "structure.derivatives", variable.line, text
-    unknowns = _initial_unknowns(model, lists["ContinuousStateDerivative"])
+    unknowns = _initial_unknowns(model, derivatives)
     yield from _check_list(
-        "structure.initial-unknowns", "initial unknown", lists["InitialUnknown"], unknowns
+        "structure.initial-unknowns",
+        "initial unknown",
+        _variables_in(model, "InitialUnknown"),
+        unknowns,
     )
 
 

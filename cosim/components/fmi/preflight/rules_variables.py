@@ -150,16 +150,12 @@ def check_references(model: ModelDescription) -> Iterator[Violation]:
             kind = _ACCESSOR_TYPES.get(variable.kind, variable.kind) if model.major < 3 else ""
             groups[kind, int(text)].append(variable)
     for group in groups.values():
-        if len(group) > 1 and model.major > 1:  # FMI 1.0 allows aliases of all variables
-            yield from (
-                _check_shared_references(group) if model.major == 3 else _check_aliases(group)
-            )
-
-
-def _check_shared_references(group: Sequence[ModelVariable]) -> Iterator[Violation]:
-    for variable in group[1:]:
-        text = f'has the same value reference as "{group[0].name}", expected a unique one'
-        yield "reference.shared", variable, text
+        if model.major == 3:
+            for variable in group[1:]:
+                text = f'has the same value reference as "{group[0].name}", expected a unique one'
+                yield "reference.shared", variable, text
+        elif model.major == 2:  # FMI 1.0 allows aliases of all variables
+            yield from _check_aliases(group)
 
 
 def _check_aliases(group: Sequence[ModelVariable]) -> Iterator[Violation]:
@@ -247,19 +243,22 @@ def check_starts(model: ModelDescription) -> Iterator[Violation]:
         if (
             variable.kind not in ("Clock", "") and model.major > 1
         ):  # FMI 1.0 requires no start values
-            yield from _check_start_presence(variable)
+            initial, causality = variable.initial, variable.causality
+            if not variable.start_words and (
+                initial in ("exact", "approx") or causality == "input"
+            ):
+                reason = "inputs" if causality == "input" else f'initial="{initial}"'
+                text = f"has no start value, which is required for {reason}"
+                yield "start.missing", variable, text
+            if variable.start_words is not None and (
+                initial == "calculated" or causality == "independent"
+            ):
+                reason = (
+                    "it is independent" if causality == "independent" else 'initial="calculated"'
+                )
+                yield "start.unwanted", variable, f"has a start value, but {reason}"
         if variable.kind not in _NON_NUMERIC_TYPES:
             yield from _check_start_values(variable)
-
-
-def _check_start_presence(variable: ModelVariable) -> Iterator[Violation]:
-    initial, causality = variable.initial, variable.causality
-    if not variable.start_words and (initial in ("exact", "approx") or causality == "input"):
-        reason = "inputs" if causality == "input" else f'initial="{initial}"'
-        yield "start.missing", variable, f"has no start value, which is required for {reason}"
-    if variable.start_words is not None and (initial == "calculated" or causality == "independent"):
-        reason = "it is independent" if causality == "independent" else 'initial="calculated"'
-        yield "start.unwanted", variable, f"has a start value, but {reason}"
 
 
 def _check_start_values(variable: ModelVariable) -> Iterator[Violation]:
@@ -280,7 +279,14 @@ def _check_start_values(variable: ModelVariable) -> Iterator[Violation]:
             yield "start.infinite" if is_allowed else "start.finite", variable, text
         elif not low <= number <= high:
             yield "start.range", variable, f"found start value {word}, expected {low:g} to {high:g}"
-    yield from _check_enumeration_start(variable)
+    if variable.kind == "Enumeration" and variable.declared_type and variable.declared_type.items:
+        values = {item[1].strip() for item in variable.declared_type.items}
+        for word in variable.start_words or ():
+            if word not in values:
+                text = (
+                    f'found start value {word}, expected an item of "{variable.declared_type.name}"'
+                )
+                yield "start.range", variable, text
 
 
 def _read_limits(variable: ModelVariable) -> Generator[Violation, None, tuple[float, float]]:
@@ -317,17 +323,6 @@ def read_limit(text: str) -> float | None:
     except ValueError:
         return None
     return None if math.isnan(limit) else limit
-
-
-def _check_enumeration_start(variable: ModelVariable) -> Iterator[Violation]:
-    if variable.kind == "Enumeration" and variable.declared_type and variable.declared_type.items:
-        values = {item[1].strip() for item in variable.declared_type.items}
-        for word in variable.start_words or ():
-            if word not in values:
-                text = (
-                    f'found start value {word}, expected an item of "{variable.declared_type.name}"'
-                )
-                yield "start.range", variable, text
 
 
 def check_dimensions(model: ModelDescription) -> Iterator[Violation]:

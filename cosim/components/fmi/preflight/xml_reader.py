@@ -59,13 +59,7 @@ def _read_fmi1_interfaces(root: Any) -> dict[Interface, dict[str, str]]:
         return {"model-exchange": identifier}
     if (stand_alone := implementation.find(_STAND_ALONE)) is None:
         return {}
-    capabilities = stand_alone.find("Capabilities")
-    return {
-        "co-simulation": {
-            **({} if capabilities is None else dict(capabilities.items())),
-            **identifier,
-        }
-    }
+    return {"co-simulation": _read_attributes(stand_alone.find("Capabilities")) | identifier}
 
 
 def _read_fmi1_units(root: Any) -> Iterator[UnitDefinition]:

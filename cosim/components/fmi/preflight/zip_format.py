@@ -17,9 +17,9 @@ from io import BufferedReader
 from ....core.text import count_noun
 from .findings import FatalFindingError
 
-#: end of central directory record
-_EOCD = struct.Struct("<4s4H2LH")
-_CENTRAL_HEADER, _LOCAL_HEADER = struct.Struct("<4s6H3L5H2L"), struct.Struct("<4s5H3L2H")
+#: formats of the end of central directory record and of the headers, without unused fields
+_EOCD = struct.Struct("<4x4H2LH")
+_CENTRAL_HEADER, _LOCAL_HEADER = struct.Struct("<8x2H4x3L3H4x2L"), struct.Struct("<6x2H4x3L2H")
 _EOCD_SIGNATURE, _CENTRAL_SIGNATURE, _LOCAL_SIGNATURE = b"PK\x05\x06", b"PK\x01\x02", b"PK\x03\x04"
 _MAX_COMMENT_SIZE = 0xFFFF
 #: largest accepted number of files and folders in the archive
@@ -127,7 +127,7 @@ def _read_eocd(file: BufferedReader) -> tuple[int, int, int]:
         raise FatalFindingError(
             "archive.zip", "is not an FMU: it is not a ZIP file, or its end is missing"
         )
-    _, disk, directory_disk, disk_count, count, size, offset, comment_size = _EOCD.unpack_from(
+    disk, directory_disk, disk_count, count, size, offset, comment_size = _EOCD.unpack_from(
         tail, position
     )
     surplus = len(tail) - position - _EOCD.size - comment_size
@@ -167,26 +167,10 @@ def _read_entry(directory: bytes, position: int) -> tuple[ZipEntry, int]:
         _CENTRAL_SIGNATURE, position
     ):
         raise _damaged_directory_error(position)
-    fields = _CENTRAL_HEADER.unpack_from(directory, position)
-    (
-        _,
-        _,
-        _,
-        flags,
-        method,
-        _,
-        _,
-        crc,
-        compressed,
-        size,
-        name_size,
-        extra_size,
-        comment_size,
-        _,
-        _,
-        attributes,
-        offset,
-    ) = fields
+    flags, method, crc, compressed, size, *sizes, attributes, offset = _CENTRAL_HEADER.unpack_from(
+        directory, position
+    )
+    name_size, extra_size, comment_size = sizes
     name_begin = position + _CENTRAL_HEADER.size
     extra_begin = name_begin + name_size
     end = extra_begin + extra_size + comment_size
@@ -239,9 +223,7 @@ def find_data_offset(file: BufferedReader, entry: ZipEntry, end: int) -> int:
         raise FatalFindingError(
             "archive.header", f"found no member at byte {entry.offset}", entry.decoded_name
         )
-    _, _, flags, method, _, _, crc, compressed, size, name_size, extra_size = _LOCAL_HEADER.unpack(
-        header
-    )
+    flags, method, crc, compressed, size, name_size, extra_size = _LOCAL_HEADER.unpack(header)
     name, extra = file.read(name_size), file.read(extra_size)
     size, compressed = _apply_zip64(extra, size, compressed)
     pairs = {
