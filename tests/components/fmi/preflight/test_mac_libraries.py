@@ -159,7 +159,7 @@ def test_an_fmu_is_checked_for_macos(content, good, tmp_path, library, architect
                 machine,
             )
         )
-    assert [finding.rule.name for finding in findings] == (["binary.format"] if content else [])
+    assert [finding.rule for finding in findings] == (["binary.format"] if content else [])
 
 
 def test_mutants_are_read_or_refused(library, architecture):
