@@ -23,6 +23,17 @@ PATH = click.Path(path_type=Path)
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
+def options(*decorators: Decorator) -> Decorator:
+    """Return a decorator that adds several options to a command."""
+
+    def add_options(command: Callable[..., Any]) -> Callable[..., Any]:
+        for decorate in reversed(decorators):
+            command = decorate(command)
+        return command
+
+    return add_options
+
+
 def complete_shipped(
     pattern: str,
 ) -> Callable[[click.Context, click.Parameter, str], list[CompletionItem]]:
@@ -75,12 +86,10 @@ def new_file_options(result: str = "file") -> Decorator:
         "folder": ("Parent of the folder NAME; default: the working directory.", "existing files"),
     }
     where, what = help_texts[result]
-
-    def add_options(command: Callable[..., Any]) -> Callable[..., Any]:
-        force = click.option("--force", is_flag=True, help=f"Overwrite {what}.")
-        return click.option("--directory", type=PATH, default=Path(), help=where)(force(command))
-
-    return add_options
+    return options(
+        click.option("--directory", type=PATH, default=Path(), help=where),
+        click.option("--force", is_flag=True, help=f"Overwrite {what}."),
+    )
 
 
 def _set_excel_safe(_context: click.Context, _option: click.Parameter, enabled: bool) -> None:

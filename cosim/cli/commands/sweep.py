@@ -79,19 +79,16 @@ def _run_sweep(
     workers: int | None,
     scheduler: str | None,
 ) -> int:
-    from ...process.supervisor import interrupt_on_termination
     from ...studies.summary.sweep_files import write_sweep_files
 
     began, interrupted = time.monotonic(), False
     done = sum(key in run_store for key in sweep.keys)
     if done < len(sweep):
         try:
-            with (
-                interrupt_on_termination(),
-                study_options.show_progress(len(sweep)) as progress,
-                study_options.create_runner(sweep.study, workers, scheduler) as runner,
+            with study_options.running_study(sweep.study, len(sweep), workers, scheduler, done) as (
+                runner,
+                progress,
             ):
-                progress.start(done)
                 sweep.run(run_store, runner, progress)
         except KeyboardInterrupt:
             interrupted = True
