@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from . import supervision
-from .options import options
+from .options import flag_option, options
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -23,18 +23,15 @@ if TYPE_CHECKING:
 _DEFAULT_SPEED = 1.0
 
 view_options = options(
-    click.option(
+    flag_option(
         "--view",
-        is_flag=True,
         help=(
             "Show the run live in a browser on this machine: pause, step, set the speed, tunable "
             "parameters and unconnected inputs. Starts in real time, or with the FACTOR of "
             "--real-time."
         ),
     ),
-    click.option(
-        "--wait", is_flag=True, help="With --view: begin when the live page has been opened."
-    ),
+    flag_option("--wait", help="With --view: begin when the live page has been opened."),
     click.option(
         "--view-port",
         type=click.IntRange(0, 65535),

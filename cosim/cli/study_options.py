@@ -18,7 +18,7 @@ from ..core.resources import available_processors
 from ..core.size_limits import MAX_RUNS
 from ..core.text import count_noun
 from . import current_command_line
-from .options import csv_option, options
+from .options import csv_option, flag_option, options
 
 if TYPE_CHECKING:
     from ..studies.execution.job import Record
@@ -51,9 +51,7 @@ study_options = options(
         show_default=True,
         help="Refuse a study of more runs.",
     ),
-    click.option(
-        "--retry-failed", is_flag=True, help="Repeat the runs that failed in an earlier call."
-    ),
+    flag_option("--retry-failed", help="Repeat the runs that failed in an earlier call."),
     csv_option,
 )
 

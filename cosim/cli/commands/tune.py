@@ -13,7 +13,7 @@ from ...core.text import count_noun
 from ...report.tables import print_table
 from .. import study_options
 from ..messages import print_json
-from ..options import complete_study, json_option, output_dir_option
+from ..options import complete_study, flag_option, json_option, output_dir_option
 
 if TYPE_CHECKING:
     from ...studies.execution.run_store import RunStore
@@ -28,9 +28,8 @@ if TYPE_CHECKING:
     "the object of best.json, with failure, the reason why no point is feasible, or null; with "
     "--worst that of worst.json"
 )
-@click.option(
+@flag_option(
     "--worst",
-    is_flag=True,
     help="Search for the run that breaks a controller; TUNE is then a file of such a search.",
 )
 @study_options.study_options
