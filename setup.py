@@ -25,7 +25,10 @@ __path__ = [str(resources.root() / "plant_src")]
 
 
 class BuildWithBundle(build_py):
-    """The usual build of the package, and the bundle beside it (not in an editable install, which uses the checkout)."""
+    """The usual build of the package, and the bundle beside it.
+
+    An editable install has no bundle, it uses the checkout.
+    """
 
     def run(self) -> None:
         """Build the package, then copy the bundle into it."""

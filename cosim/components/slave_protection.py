@@ -23,20 +23,16 @@ from .object_state import Restore, snapshot
 
 #: methods of a class that PythonFMU calls
 _METHODS = (
-    *(
-        "__init__",
-        "setup_experiment",
-        "enter_initialization_mode",
-        "exit_initialization_mode",
-        "do_step",
-        "terminate",
-    ),
-    *(
-        f"{access}_{kind}"
-        for access in ("get", "set")
-        for kind in ("real", "integer", "boolean", "string")
-    ),
-    *("_get_fmu_state", "_set_fmu_state"),
+    "__init__",
+    "setup_experiment",
+    "enter_initialization_mode",
+    "exit_initialization_mode",
+    "do_step",
+    "terminate",
+    *(f"get_{kind}" for kind in ("real", "integer", "boolean", "string")),
+    *(f"set_{kind}" for kind in ("real", "integer", "boolean", "string")),
+    "_get_fmu_state",
+    "_set_fmu_state",
 )
 #: attributes of a slave that belong to PythonFMU and are no state
 PYTHONFMU_ATTRIBUTES = frozenset({"vars", "log_queue"})
@@ -69,13 +65,14 @@ def protected_class(slave_class: type[Fmi2Slave]) -> type[Fmi2Slave]:
 
 
 def load_class(entry: dict[str, Any], source: str, name: str) -> type[Fmi2Slave]:
-    """Import the class of an FMU from the folder of the FMU, and return it with a log of its exceptions.
+    """Import the class of an FMU from its folder, and return it with a log of its exceptions.
 
-    PythonFMU executes the entry module at each instantiation, but imports it only once in a process. If the folder that it was
-    imported from has been removed since, the modules are imported again from the folder of the present instance.
+    PythonFMU executes the entry module at each instantiation, but imports it only once in a
+    process. If the folder that it was imported from has been removed since, the modules are
+    imported again from the folder of the present instance.
 
-    PythonFMU 0.7.0 also releases the globals of the entry once more than it acquired them, which the reference in `_kept`
-    compensates. Otherwise a later instantiation uses memory that is free.
+    PythonFMU 0.7.0 also releases the globals of the entry once more than it acquired them, which
+    the reference in `_kept` compensates. Otherwise a later instantiation uses memory that is free.
 
     Args:
         entry: Globals of the entry module, a package.

@@ -2,14 +2,13 @@
 
 The methods of a component are called in the order of the FMI Co-Simulation life cycle:
 
-    bind                                            once: pass the arrays for inputs and outputs
-    instantiate                                     once: load foreign code, not earlier
-    set                                             parameters and start values
-    enter_initialization_mode                       { set_inputs, get_outputs } may be repeated in
-    this mode exit_initialization_mode                        then get_outputs: the initial outputs
-    { set_inputs, do_step, get_outputs }            once per step; set tunable parameters between
-    steps terminate, free                                 free is always called exactly once, also
-    after a failure
+    bind                                  once: pass the arrays for inputs and outputs
+    instantiate                           once: load foreign code, not earlier
+    set                                   parameters and start values
+    enter_initialization_mode             { set_inputs, get_outputs } may be repeated in this mode
+    exit_initialization_mode              then get_outputs: the initial outputs
+    { set_inputs, do_step, get_outputs }  once per step; set tunable parameters between steps
+    terminate, free                       free is called exactly once, also after a failure
 
 Values are exchanged in typed arrays ("ports") that belong to the engine. A step makes no
 conversions, allocations or look-ups.

@@ -87,6 +87,10 @@ class InputError(CosimError):
         )
         super().__init__("\n".join(map(str, self.problems)))
 
+    def located(self, where: str) -> list[Problem]:
+        """Return the problems; `where` is the location of those without one."""
+        return [Problem(each.message, each.where or where) for each in self.problems]
+
 
 class ComponentError(CosimError):
     """Failure of a component during the run.

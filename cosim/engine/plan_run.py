@@ -5,6 +5,7 @@ Initialize its components, step them with events and observers, and free them in
 
 from __future__ import annotations
 
+import os
 import tempfile
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -176,6 +177,8 @@ class PlanRun:
         finally:
             self._watch.add("loop_seconds", perf_counter() - began)
             if journal:
+                if not journal.is_valid:  # overwritten: the supervisor reports it, and has the rows
+                    os._exit(70)
                 journal.enter_phase(Phase.IDLE)
             self.is_finished = self.executor.is_finished
             if self.failure or (

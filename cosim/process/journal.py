@@ -59,8 +59,8 @@ class Phase(IntEnum):
 
 
 _PHASES = frozenset(Phase)
-#: longest deadline (ms)
-_MAX_DEADLINE = 10**15
+#: longest deadline (ms), and largest number of steps, rows or changes
+_MAX_DEADLINE, _MAX_COUNT = 10**15, 2**53
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +118,8 @@ class Journal:
     def is_valid(self) -> bool:
         """True if the content is plausible; foreign code in the process can overwrite it."""
         deadline, counts = self[DEADLINE], (self[STEP_COUNT], self[ROW_COUNT], self[CHANGE_COUNT])
-        return self[PHASE] in _PHASES and -1 <= deadline <= _MAX_DEADLINE and min(counts) >= 0
+        counts_are_valid = min(counts) >= 0 and max(counts) <= _MAX_COUNT
+        return self[PHASE] in _PHASES and -1 <= deadline <= _MAX_DEADLINE and counts_are_valid
 
     def claim(self) -> bool:
         """Return True at the first call.

@@ -4,8 +4,8 @@ The reference is the polyline through its rows. The tube is the area covered by 
 centre moves along the polyline. Its half length is `time`; its half height is the larger of
 `absolute` and `relative` times the range (maximum - minimum) of the reference. Hence
 
-    lower(t) = min r(s) - half_width, upper(t) = max r(s) + half_width over all s of the reference
-    with |s - t| <= time.
+    lower(t) = min r(s) - half_width
+    upper(t) = max r(s) + half_width,  both over all s of the reference with |s - t| <= time.
 
 Two rows with the same time are a jump, and the reference then includes all values between the two
 rows. This is the tube of funnel and pyfunnel (Lawrence Berkeley National Laboratory) without their

@@ -17,10 +17,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence, Set
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..core import paths
 from ..core.errors import InputError, Problem, did_you_mean, nearest_name
@@ -32,8 +32,8 @@ from .included_files import include_files
 from .json_document import Document, JsonPath, Origin, path_in_system, read_document
 from .schema import KEYED_LISTS, NOT_INHERITED
 
-#: entries with names -> their noun, and the keys of which an entry needs one to be new; without
-#: them it changes one of the base
+#: entries with names -> their noun, and the keys of which an entry needs one to be new (a component
+#: that of a source); without them it changes one of the base
 _NEW_ENTRIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "components": ("component", ()),
     "connections": ("connection to", ("from",)),
@@ -87,25 +87,21 @@ def expand_document(document: Document, extending: tuple[Path, ...] = ()) -> Doc
     merger = _Merger(document, base)
     inherited = _inherited(base, document.file.parent)
     changes = {key: each for key, each in value.items() if key != "extends"}
-    merged = merger.merge_objects(
-        (), inherited, {**changes, **_removals_with_components(inherited, changes)}
-    )
+    changes |= _removals_with_components(inherited, changes)
+    merged = merger.merge((), _Part(base, (), inherited), _Part(document, (), changes))
     invalid = [
         path
         for path, origin in merger.origins.items()
         if origin.path in origin.document.invalid_paths
     ]
-    problems = [*document.problems, *base.problems, *merger.problems]
-    bases = (*document.bases, base.file, *base.bases)
-    origins, removed = merger.origins, merger.removed
     return replace(
         document,
         value=merged,
-        problems=problems,
+        problems=[*document.problems, *base.problems, *merger.problems],
         invalid_paths=invalid,
-        origins=origins,
-        bases=bases,
-        removed=removed,
+        origins=merger.origins,
+        bases=(*document.bases, base.file, *base.bases),
+        removed=merger.removed,
     )
 
 
@@ -161,7 +157,7 @@ def _read_base(document: Document, name: Any, extending: tuple[Path, ...]) -> Do
     where = document.where(("extends",))
     if not isinstance(name, str):
         raise InputError(
-            [Problem("expected the path of a file or the name of a shipped scenario", where)]
+            Problem("expected the path of a file or the name of a shipped scenario", where)
         )
     near = path_in(document.file.parent, name if name.endswith(".json") else f"{name}.json")
     try:
@@ -172,11 +168,9 @@ def _read_base(document: Document, name: Any, extending: tuple[Path, ...]) -> Do
             raise InputError(f"more than {MAX_LEVELS} files extend each other")
         base = read_document(file)
     except InputError as error:
-        raise InputError(
-            [Problem(problem.message, problem.where or where) for problem in error.problems]
-        ) from None
+        raise InputError(error.located(where)) from None
     if not isinstance(base.value, dict):
-        raise InputError([Problem("expected an object", base.where(()))])
+        raise InputError(Problem("expected an object", base.where(())))
     return base
 
 
@@ -258,20 +252,20 @@ def _component_of(name: Any) -> str:
     return name.partition(".")[0] if isinstance(name, str) else ""
 
 
-def _new_entry(kind: str) -> tuple[str, tuple[str, ...]]:
-    """Return the noun of an entry, and the keys of which it needs one to be new."""
-    noun, keys = _NEW_ENTRIES.get(kind, ("", ()))
-    return noun, tuple(component_kinds(None)) if kind == "components" else keys
+class _Part(NamedTuple):
+    """Value of one of the two documents; None stands for one that does not exist."""
 
+    document: Document
+    path: JsonPath
+    value: Any
 
-def _is_change_of_nothing(kind: str, new: Any) -> bool:
-    """Return True if an entry that the base lacks has no key that makes it new, even misspelt."""
-    _, keys = _new_entry(kind)
-    return (
-        isinstance(new, dict)
-        and bool(keys)
-        and not any(key in keys or nearest_name(key, keys) for key in new)
-    )
+    def entries(self) -> dict[str | int, _Part]:
+        """Return the entries of an object, or the elements of a list by index."""
+        is_object = isinstance(self.value, dict)
+        items: Iterable[tuple[Any, Any]] = (
+            self.value.items() if is_object else enumerate(self.value)
+        )
+        return {key: _Part(self.document, (*self.path, key), each) for key, each in items}
 
 
 class _Merger:
@@ -281,150 +275,118 @@ class _Merger:
     """
 
     def __init__(self, document: Document, base: Document) -> None:
-        self._document, self._base = document, base
-        self.origins: dict[JsonPath, Origin] = {(): Origin(document, ())}
+        self._document = document
+        self.origins: dict[JsonPath, Origin] = {}
         self.problems: list[Problem] = []
         self.removed = set(base.removed)
 
-    def merge_objects(
+    def merge(self, path: JsonPath, old: _Part, new: _Part) -> Any:
+        """Return the merged value at a path of the result."""
+        if not isinstance(new.value, dict):
+            return self._copy(path, new)
+        match path_in_system(path):
+            case (str(kind),) if kind in KEYED_LISTS:
+                return self._merge_list(path, old, new, KEYED_LISTS[kind])
+            case ("components", _) if isinstance(old.value, dict):
+                old = old._replace(value=inherited_component(old.value, new.value))
+            case ("components", _, "system") if isinstance(old.value, dict):
+                if new.path in self._document.complete_systems:
+                    return self._copy(path, new)
+                removals = _removals_with_components(old.value, new.value)
+                new = new._replace(value={**new.value, **removals})
+        entries = old.entries() if isinstance(old.value, dict) else {}
+        return self._merge_entries(path, entries, new, list(map(str, entries)))
+
+    def _merge_list(self, path: JsonPath, old: _Part, new: _Part, name_key: str) -> list[Any]:
+        """Merge a list of named elements with changes by name, as objects of these names."""
+        elements = old.entries() if isinstance(old.value, list) else {}
+        names = [
+            str(each.value.get(name_key)) if isinstance(each.value, dict) else ""
+            for each in elements.values()
+        ]
+        # elements that share a name keep their indices as keys, so that no change can mean them
+        by_name: dict[str | int, _Part] = {
+            i if names.count(name) > 1 else name: elements[i] for i, name in enumerate(names)
+        }
+        return list(self._merge_entries(path, by_name, new, names, name_key).values())
+
+    def _merge_entries(
         self,
         path: JsonPath,
-        old: Mapping[str, Any],
-        new: Mapping[str, Any],
-        old_path: JsonPath = (),
-        new_path: JsonPath = (),
-    ) -> dict[str, Any]:
-        """Merge two objects.
+        old: Mapping[str | int, _Part],
+        new: _Part,
+        names: Sequence[str],
+        name_key: str = "",
+    ) -> dict[str | int, Any]:
+        """Merge the entries of two objects.
 
-        The paths are those of the result and of the two objects in their documents.
+        `names` are all names of the base. With `name_key` the entries are the elements of a list.
         """
-        result = {}
-        for key in dict.fromkeys((*old, *new)):
-            places = ((*path, key), (*old_path, key), (*new_path, key))
-            if key not in new:
-                result[key] = self._copy(self._base, places[0], old[key], places[1])
-            elif (
-                path_in_system(path) == ("components",)
-                and key not in old
-                and _is_change_of_nothing("components", new[key])
-            ):
-                self._report_unknown(places[2], old)
-            elif new[key] is not None:
-                result[key] = self._merge(*places, old.get(key), new[key])
-            elif key in old:
-                self.removed.add(places[0])
-            else:
-                own = not path and key in NOT_INHERITED
+        self.origins[path] = Origin(self._document, new.path)
+        result: dict[str | int, Any] = {}
+        changes = new.entries()
+        for key in dict.fromkeys((*old, *changes)):
+            place = (*path, len(result) if name_key else key)
+            before, change = old.get(key), changes.get(key)
+            if change is None:
+                result[key] = self._copy(place, old[key])
+            elif before is None and name_key and names.count(str(key)) > 1:
                 self._report(
-                    places[2],
-                    (
-                        "nothing to "
-                        f"remove{', it is not inherited' if own else did_you_mean(key, old)}"
-                    ),
-                )
-        return result
-
-    def _merge(
-        self, path: JsonPath, old_path: JsonPath, new_path: JsonPath, old: Any, new: Any
-    ) -> Any:
-        """Merge two values; `old` is None if the base has no such value."""
-        if isinstance(new, dict):
-            self.origins[path] = Origin(self._document, new_path)
-            match path_in_system(path):
-                case (kind,) if path_in_system(path) in KEYED_LISTS:
-                    key = KEYED_LISTS[(str(kind),)]
-                    return self._merge_list(
-                        path, old_path, new_path, key, old if isinstance(old, list) else [], new
-                    )
-                case ("components", _) if isinstance(old, dict):
-                    old = inherited_component(old, new)
-                case ("components", _, "system") if isinstance(old, dict):
-                    if new_path in self._document.complete_systems:
-                        return self._copy(self._document, path, new, new_path)
-                    new = {**new, **_removals_with_components(old, new)}
-            return self.merge_objects(
-                path, old if isinstance(old, dict) else {}, new, old_path, new_path
-            )
-        return self._copy(self._document, path, new, new_path)
-
-    def _merge_list(
-        self,
-        path: JsonPath,
-        old_path: JsonPath,
-        new_path: JsonPath,
-        key: str,
-        old: list[Any],
-        new: Mapping[str, Any],
-    ) -> list[Any]:
-        """Merge a list of named elements with changes by name."""
-        kind = str(path[-1])
-        names = [str(element.get(key)) if isinstance(element, dict) else "" for element in old]
-        result: list[Any] = []
-        for i, name in enumerate(names):
-            place, old_place = (*path, len(result)), (*old_path, i)
-            if name not in new or names.count(name) > 1:
-                result.append(self._copy(self._base, place, old[i], old_place))
-            elif new[name] is not None:
-                new_place = (*new_path, name)
-                result.append(self._merge_element(place, old_place, new_place, old[i], new[name]))
-        for name, change in new.items():
-            new_place = (*new_path, name)
-            if names.count(name) > 1:
-                self._report(
-                    new_place,
-                    f"the base has {names.count(name)} elements with this name; a list "
+                    change,
+                    f"the base has {names.count(str(key))} elements with this name; a list "
                     "replaces all elements",
                 )
-            elif name not in names and change is None:
-                self._report(new_place, f"nothing to remove{did_you_mean(name, names)}")
-            elif name not in names and _is_change_of_nothing(kind, change):
-                self._report_unknown(new_place, names)
-            elif name not in names:
-                place = (*path, len(result))
-                result.append({key: name, **self._merge_element(place, (), new_place, {}, change)})
-                self.origins[(*place, key)] = Origin(self._document, new_place)
+            elif change.value is None:
+                if before:
+                    self.removed.add(place)
+                else:
+                    own = not path and key in NOT_INHERITED
+                    hint = ", it is not inherited" if own else did_you_mean(str(key), names)
+                    self._report(change, f"nothing to remove{hint}")
+            elif before or not self._changes_nothing(change, names):
+                if name_key and not isinstance(change.value, dict):
+                    self._report(change, "expected an object, or null to remove the element")
+                    change = change._replace(value={})
+                nothing = _Part(self._document, (), None)
+                result[key] = self.merge(place, before or nothing, change)
+                if name_key and not before:
+                    result[key] = {name_key: key, **result[key]}
+                    self.origins[(*place, name_key)] = Origin(self._document, change.path)
         return result
 
-    def _merge_element(
-        self, path: JsonPath, old_path: JsonPath, new_path: JsonPath, old: Any, new: Any
-    ) -> dict[str, Any]:
-        if not isinstance(new, dict):
-            self._report(new_path, "expected an object, or null to remove the element")
-            new = {}
-        self.origins[path] = Origin(self._document, new_path)
-        return self.merge_objects(path, old, new, old_path, new_path)
+    def _copy(self, path: JsonPath, part: _Part) -> Any:
+        """Return a copy of a value of one of the documents."""
+        self.origins[path] = part.document.origin(part.path)
+        if not isinstance(part.value, dict | list):
+            return part.value
+        copied = {key: self._copy((*path, key), each) for key, each in part.entries().items()}
+        return copied if isinstance(part.value, dict) else list(copied.values())
 
-    def _copy(self, document: Document, path: JsonPath, value: Any, old_path: JsonPath) -> Any:
-        """Return a copy of a value that one of the documents has at `old_path`."""
-        self.origins[path] = document.origin(old_path)
-        if isinstance(value, dict):
-            return {
-                key: self._copy(document, (*path, key), each, (*old_path, key))
-                for key, each in value.items()
-            }
-        if isinstance(value, list):
-            return [
-                self._copy(document, (*path, i), each, (*old_path, i))
-                for i, each in enumerate(value)
-            ]
-        return value
+    def _changes_nothing(self, change: _Part, names: Collection[str]) -> bool:
+        """Report a change of an entry that the base lacks, without a key that makes it new.
 
-    def _report_unknown(self, path: JsonPath, names: Collection[str]) -> None:
-        """Report a change of an entry that the base lacks; `names` are those of its entries."""
-        noun, keys = _new_entry(str(path[-2]))
-        name = str(path[-1])
+        A misspelt one is enough. `names` are those of the base's entries.
+        """
+        match path_in_system(change.path):
+            case (str(kind), str(name)) if kind in _NEW_ENTRIES and isinstance(change.value, dict):
+                noun, keys = _NEW_ENTRIES[kind]
+            case _:
+                return False
+        keys = keys or tuple(component_kinds(None))
+        if any(key in keys or nearest_name(key, keys) for key in change.value):
+            return False
         near = nearest_name(name, names)
         hint = (
             f'; did you mean "{near}"?'
             if near
             else f"; a new one needs {' or '.join(keys)}{did_you_mean(name, names)}"
         )
-        self._report(
-            path, f'the base "{self._document.value["extends"]}" has no {noun} "{name}"{hint}'
-        )
+        base = self._document.value["extends"]
+        self._report(change, f'the base "{base}" has no {noun} "{name}"{hint}')
+        return True
 
-    def _report(self, path: JsonPath, text: str) -> None:
-        self.problems.append(Problem(text, self._document.where(path)))
+    def _report(self, change: _Part, text: str) -> None:
+        self.problems.append(Problem(text, self._document.where(change.path)))
 
 
 def inherited_component(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:

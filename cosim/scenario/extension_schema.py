@@ -90,7 +90,7 @@ def with_arguments(schema: Schema, file_and_class: str, arguments: Schema) -> Sc
 def _change_of_root(full: Schema, definitions: Mapping[str, Schema]) -> Schema:
     change = _change_of_object(full, definitions)
     properties = change["properties"]
-    for (key,), name in KEYED_LISTS.items():
+    for key, name in KEYED_LISTS.items():
         if key in properties:
             element = {"$ref": f"{full['properties'][key]['items']['$ref']}{_SUFFIX}"}
             named = {

@@ -129,10 +129,7 @@ class _Inclusion:
                 return read_mesh(self.files[-1])
             file = read_document(self._document.file.parent / text)
         except InputError as error:
-            where = self._document.where(path)
-            self.problems += [
-                Problem(problem.message, problem.where or where) for problem in error.problems
-            ]
+            self.problems += error.located(self._document.where(path))
             self.invalid_paths.append(path)
             return {}
         self.files.append(file.file)

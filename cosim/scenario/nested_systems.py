@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
@@ -88,18 +88,19 @@ class Node:
             yield from child.walk()
         yield self
 
-    def find_component(self, full_name: str) -> tuple[Node, str] | None:
-        """Return (system, name) of the component with a full name such as "uav.vtol".
+    def where_component(self, full_name: str, *path: str | int) -> str:
+        """Return the location of a part of the component with a full name such as "uav.vtol".
 
-        None if there is none.
+        "" if there is no such component.
         """
         *systems, name = full_name.split(".")
         node = self
         for system in systems:
             if system not in node.children:
-                return None
+                return ""
             node = node.children[system]
-        return (node, name) if name in node.spec.components else None
+        exists = name in node.spec.components
+        return node.where("components", name, *path) if exists else ""
 
     def leaves(self) -> Iterator[tuple[Node, str]]:
         """Yield (system, name) of every valid component, without nested systems, in file order."""
@@ -169,16 +170,6 @@ def files_of_system(root: Node, spec: ScenarioSpec, is_loaded: bool = False) -> 
     return {*files, *package_files(python)}
 
 
-def open_scenario(scenario: str | Path | Mapping[str, Any]) -> Document:
-    """Return the expanded JSON document of a scenario.
-
-    Of a file, of a shipped scenario, or of a dict.
-    """
-    if isinstance(scenario, Mapping):
-        return expand_document(document_of_dict(scenario))
-    return read_system_document(find_scenario(scenario))
-
-
 def load_scenario(
     scenario: str | Path | Mapping[str, Any],
     settings: Mapping[str, Any] | None = None,
@@ -197,14 +188,17 @@ def load_scenario(
         InputError: The file does not exist or is not JSON, or the expanded scenario is too large.
             Other problems are collected in the result.
     """
-    document = open_scenario(scenario)
+    if isinstance(scenario, Mapping):
+        document = expand_document(document_of_dict(scenario))
+    else:
+        document = read_system_document(find_scenario(scenario))
     _refuse_study(document)
     variables, problems = apply_settings(document, settings or {}, folder)
     reader = _SystemReader()
     file = reader.read(document, ScenarioSpec, ())
     check_expanded_size(file)
-    seeds = _find_seed_problems(document, file.spec, file.invalid_keys)
-    return Scenario(_make_node(file), [*problems, *reader.problems, *seeds], variables)
+    problems += [*reader.problems, *_find_seed_problems(file)]
+    return Scenario(_make_node(file), problems, variables)
 
 
 def _refuse_study(document: Document) -> None:
@@ -217,26 +211,22 @@ def _refuse_study(document: Document) -> None:
     ):
         if key in value and "scenario" in value and "components" not in value:
             text = f"expected a scenario, found a file for `cosim {command}`"
-            raise InputError([Problem(text, document.where(("scenario",)))])
+            raise InputError(Problem(text, document.where(("scenario",))))
 
 
-def _find_seed_problems(
-    document: Document, spec: SystemSpec, invalid_keys: Set[str]
-) -> Iterator[Problem]:
+def _find_seed_problems(file: SystemFile) -> Iterator[Problem]:
     """Yield a problem for each JSON pointer of "seeds" that no value can be set at.
 
     Those below invalid keys are left out.
     """
-    for i, pointer in enumerate(spec.seeds if isinstance(spec, ScenarioSpec) else ()):
+    for i, pointer in enumerate(file.spec.seeds if isinstance(file.spec, ScenarioSpec) else ()):
+        text = ""
         if not pointer.startswith("/"):
-            yield Problem(
-                f'expected a JSON pointer, which begins with "/"; found "{shorten(pointer)}"',
-                document.where(("seeds", i)),
-            )
-        elif pointer.split("/")[1] in invalid_keys:
-            continue
-        elif problem := set_value(copy_json(document.value), pointer, 0):
-            yield Problem(problem, document.where(("seeds", i)))
+            text = f'expected a JSON pointer, which begins with "/"; found "{shorten(pointer)}"'
+        elif pointer.split("/")[1] not in file.invalid_keys:
+            text = set_value(copy_json(file.document.value), pointer, 0)
+        if text:
+            yield Problem(text, file.document.where(("seeds", i)))
 
 
 class _SystemReader:
@@ -262,11 +252,8 @@ class _SystemReader:
         raw = document.value.get("components") if isinstance(document.value, dict) else None
         invalid_components = set(raw if isinstance(raw, dict) else {}) - set(spec.components)
         if not spec.components and not invalid_components and "components" not in invalid_keys:
-            self.problems.append(
-                Problem(
-                    "expected at least one component, found none", document.where(("components",))
-                )
-            )
+            text = "expected at least one component, found none"
+            self.problems.append(Problem(text, document.where(("components",))))
             invalid_keys.add("components")
         file = SystemFile(document, spec, invalid_keys, invalid_components, {})
         ancestors = (*ancestors, paths.resolve_path(document.file))
@@ -289,40 +276,25 @@ class _SystemReader:
 
         An inline system is a part of the file of its parent.
         """
-        if isinstance(system, str):
-            return self._read_nested_file(parent, name, system, ancestors)
-        place = ("components", name, "system")
-        if len(ancestors) + 1 > MAX_LEVELS:
-            text = f'the nested system "{name}" is nested more than {MAX_LEVELS} levels deep'
-            self.problems.append(Problem(text, parent.document.where(place)))
-            return None
-        return self.read(parent.document.part(place), NestedSpec, ancestors)
-
-    def _read_nested_file(
-        self, parent: SystemFile, name: str, path: str, ancestors: tuple[Path, ...]
-    ) -> SystemFile | None:
-        file = parent.document.file.parent / path
-        key = (
-            paths.resolve_path(file.parent) / file.name
-        )  # the file's relative paths start from this folder
+        place, is_inline = ("components", name, "system"), isinstance(system, dict)
+        file = parent.document.file.parent / ("" if isinstance(system, dict) else system)
+        # the file's relative paths start from this folder
+        key = paths.resolve_path(file.parent) / file.name
+        child = None if is_inline else self._files.get(key)
+        label = f'the nested system "{name if is_inline else system}"'
         try:
-            if paths.resolve_path(file) in ancestors:
-                raise InputError(f'the nested system "{path}" contains itself')
-            child = self._files.get(key)
+            if not is_inline and paths.resolve_path(file) in ancestors:
+                raise InputError(f"{label} contains itself")
             if len(ancestors) + (child.levels if child else 1) > MAX_LEVELS:
-                raise InputError(
-                    f'the nested system "{path}" is nested more than {MAX_LEVELS} levels deep'
-                )
+                raise InputError(f"{label} is nested more than {MAX_LEVELS} levels deep")
+            if is_inline:
+                return self.read(parent.document.part(place), NestedSpec, ancestors)
             if key not in self._files:
                 self._files[key] = None
-                child = self._files[key] = self.read(
-                    read_system_document(file), NestedSpec, ancestors
-                )
+                document = read_system_document(file)
+                child = self._files[key] = self.read(document, NestedSpec, ancestors)
         except InputError as error:
-            where = parent.document.where(("components", name, "system"))
-            self.problems += [
-                Problem(problem.message, problem.where or where) for problem in error.problems
-            ]
+            self.problems += error.located(parent.document.where(place))
             return None
         return child
 
@@ -363,20 +335,19 @@ def extending_scenario(
     found = find_scenario(base)
     is_shipped = found.resolve().parent == (resources.root() / "scenarios").resolve()
     extended = found.stem if is_shipped else os.path.relpath(found, folder).replace(os.sep, "/")
-    changed = (
-        load_scenario(found, settings, settings_folder).root.document.value if settings else {}
-    )
     values: dict[str, Any] = {}
-    for key in settings or {}:
-        if key.startswith("/"):
-            _copy_pointed(changed, values, pointer_keys(key))
+    settings = settings or {}
+    if settings:
+        changed = load_scenario(found, settings, settings_folder).root.document.value
+        for key in settings:
+            if key.startswith("/"):
+                _copy_pointed(changed, values, pointer_keys(key))
     values = change_paths(values, relocating(found.parent, folder))
-    for key, value in (settings or {}).items():
+    for key, value in settings.items():
         if not key.startswith("/"):
             component, _, variable = key.partition(".")
-            values.setdefault("components", {}).setdefault(component, {}).setdefault(
-                "parameters", {}
-            )[variable] = value
+            entry = values.setdefault("components", {}).setdefault(component, {})
+            entry.setdefault("parameters", {})[variable] = value
     return {"extends": extended, "name": name, "description": description, **values}
 
 

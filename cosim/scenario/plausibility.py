@@ -62,11 +62,8 @@ def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
     for name, text in find_missing_connections(
         prepared.root, prepared.system, unconnected_inputs(prepared)
     ):
-        found = prepared.root.find_component(name)
-        yield Problem(
-            text,
-            found[0].where("components", found[1]) if found else prepared.root.where("connections"),
-        )
+        root = prepared.root
+        yield Problem(text, root.where_component(name) or root.where("connections"))
 
 
 def _double_conversions(prepared: PreparedRun) -> Iterator[Problem]:
@@ -138,15 +135,9 @@ def _large_steps(prepared: PreparedRun) -> Iterator[Problem]:
             f"{fault} that {source} recommends: the results may be wrong, use about "
             f"{float(size):g} s"
         )
-        yield Problem(text, _where_step(prepared, names[0]))
-
-
-def _where_step(prepared: PreparedRun, component: str) -> str:
-    """Return the location of the period of a component, or else of the step size."""
-    found = prepared.root.find_component(component)
-    if component in prepared.system.periods and found:
-        return found[0].where("components", found[1], "period")
-    return prepared.root.where("step_size")
+        has_period = names[0] in system.periods
+        where = prepared.root.where_component(names[0], "period") if has_period else ""
+        yield Problem(text, where or prepared.root.where("step_size"))
 
 
 def _missing_reference(prepared: PreparedRun) -> Iterator[Problem]:

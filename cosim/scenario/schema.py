@@ -39,11 +39,11 @@ SCENARIO_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$"
 #: lists whose elements can be changed by an object in a file with "extends", and the key that names
 #: their elements
 KEYED_LISTS = {
-    ("connections",): "to",
-    ("kpis",): "name",
-    ("figures",): "name",
-    ("checks",): "kpi",
-    ("stop_when",): "name",
+    "connections": "to",
+    "kpis": "name",
+    "figures": "name",
+    "checks": "kpi",
+    "stop_when": "name",
 }
 #: keys that a file with "extends" does not inherit
 NOT_INHERITED = ("$schema", "name", "description", "reference")

@@ -67,10 +67,7 @@ def apply_settings(
                 )
                 value = change_pointed(name, value, change)
             except InputError as error:
-                problems += [
-                    Problem(problem.message, problem.where or f'setting "{name}"')
-                    for problem in error.problems
-                ]
+                problems += error.located(f'setting "{name}"')
                 continue
             document.bases += tuple(files)
             if text := _set_value(document, name, value):

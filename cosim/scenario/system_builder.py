@@ -66,7 +66,8 @@ class SystemBuilder:
         Raises:
             InputError: Carries all problems found since the scenario was read.
         """
-        self._set_start_values()
+        for node, name, value, where in iterate_assignments(self.root, self.assignments):
+            self._assign(self.start_values, node, name, value, where)
         aliases = self._aliases()
         connections = list(self._connections())
         system = System(
@@ -177,10 +178,6 @@ class SystemBuilder:
                     yield from filter(
                         None, map(variables.get, (target.prefix, target.prefix.rpartition("[")[0]))
                     )
-
-    def _set_start_values(self) -> None:
-        for node, name, value, where in iterate_assignments(self.root, self.assignments):
-            self._assign(self.start_values, node, name, value, where)
 
     def _assign(
         self,
@@ -354,6 +351,7 @@ class SystemBuilder:
 
 #: settings whose times must fit the communication points
 _TIMED_SETTINGS = (("stop_time",), ("record",), ("events",))
+_STEPS = (("period",), ("step_size",))
 
 
 def located_problems(root: Node, problems: Iterable[Problem]) -> Iterator[Problem]:
@@ -365,25 +363,15 @@ def located_problems(root: Node, problems: Iterable[Problem]) -> Iterator[Proble
         root: The scenario.
         problems: Problems that `check_run` found.
     """
-    return (
-        _with_location(root, problem) for problem in problems if not _is_consequence(root, problem)
-    )
-
-
-def _is_consequence(root: Node, problem: Problem) -> bool:
-    """Return True if a problem only follows from an invalid start time, stop time or step size."""
-    times = {"stop_time", "step_size", "start_time"} & root.invalid_keys
-    return bool(times) and (
-        problem.subject[:1] in _TIMED_SETTINGS
-        or problem.subject[-1:] in (("period",), ("step_size",))
-    )
-
-
-def _with_location(root: Node, problem: Problem) -> Problem:
-    if problem.where or not problem.subject:
-        return problem
-    key, *rest = problem.subject
-    if key == "components" and rest and (found := root.find_component(rest[0])):
-        node, name = found
-        return replace(problem, where=node.where("components", name, *rest[1:]), subject=())
-    return replace(problem, where=root.where(*problem.subject), subject=())
+    has_invalid_times = not root.invalid_keys.isdisjoint(("stop_time", "step_size", "start_time"))
+    for problem in problems:
+        key, rest = problem.subject[:1], problem.subject[1:]
+        is_timed = key in _TIMED_SETTINGS or problem.subject[-1:] in _STEPS
+        if has_invalid_times and is_timed:
+            continue
+        where = problem.where
+        if not where and key == ("components",) and rest:
+            where = root.where_component(*rest)
+        if not where and key:
+            where = root.where(*problem.subject)
+        yield problem if problem.where else Problem(problem.message, where)

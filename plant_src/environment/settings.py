@@ -3,14 +3,13 @@
 The argument is a JSON object such as
 
     {"seed": 7, "sea_state": 3,
-     "waves": {"spectrum": "jonswap", "significant_height": 0.05, "peak_period": 2.0, "gamma": 3.3,
-     "direction": 0.5,
-               "spreading": 2, "components": 64},
-     "wind": {"speed": 5, "direction": 1.0, "turbulence": {"speed_20ft": 5, "height": 6.1,
-     "airspeed": 5},
+     "waves": {"spectrum": "jonswap", "significant_height": 0.05, "peak_period": 2.0,
+               "gamma": 3.3, "direction": 0.5, "spreading": 2, "components": 64},
+     "wind": {"speed": 5, "direction": 1.0,
+              "turbulence": {"speed_20ft": 5, "height": 6.1, "airspeed": 5},
               "profile": {"exponent": 0.14, "reference_height": 10}},
-     "current": {"speed": 0.2, "direction": 0.0, "ramp": {"change": [0.1, 0], "start": 10,
-     "duration": 20},
+     "current": {"speed": 0.2, "direction": 0.0,
+                 "ramp": {"change": [0.1, 0], "start": 10, "duration": 20},
                  "variation": {"standard_deviation": 0.05, "time_constant": 60}}}
 
 Every key is optional; plant_src/README.md lists meanings, units and defaults.

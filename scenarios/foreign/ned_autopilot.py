@@ -9,7 +9,7 @@ from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
 
 class NedAutopilot(Fmi2Slave):
-    """Line-of-sight guidance along a line to the north-east, and proportional control of heading and speed."""
+    """Line-of-sight guidance along a line to the north-east, with proportional control."""
 
     description = "Follows the line north = east"
 

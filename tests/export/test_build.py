@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import re
 import shutil
 from hashlib import sha256
 from pathlib import Path
@@ -207,7 +208,7 @@ def test_the_check_finds_a_changed_source(root):
             "controllers/python/doubler.py": CLASS + "\n",
         },
     )
-    assert messages(root) == [
+    assert sorted(messages(root)) == [
         (
             'controllers/python/doubler.py: changed since "python/doubler" was built; run `cosim '
             "build`"
@@ -219,9 +220,9 @@ def test_the_check_finds_a_changed_source(root):
 def test_the_check_finds_a_missing_and_a_foreign_fmu(root):
     (root / "fmus/fmi3/raft.fmu").unlink()
     shutil.copy(root / "fmus/raft.fmu", root / "fmus/python/doubler.fmu")
-    assert messages(root) == [
-        "fmus/python/doubler.fmu: is not the file that `cosim build` wrote",
+    assert sorted(messages(root)) == [
         "fmus/fmi3/raft.fmu: is missing; run `cosim build`",
+        "fmus/python/doubler.fmu: is not the file that `cosim build` wrote",
     ]
 
 
@@ -285,7 +286,8 @@ def test_the_check_reports_an_fmu_that_crashes(root):
 def test_the_check_reports_a_source_that_can_no_longer_be_built(root):
     write(root, {f"{VEHICLE}/model.c": MODEL.replace("m->gain * m->x", "m->gian")})
     (message,) = messages(root)
-    assert message.startswith(f"{VEHICLE}/equations.py: can no longer be built: raft: model.c:7:")
+    place = f"{VEHICLE}/equations.py: can no longer be built: raft: model.c:"
+    assert re.match(rf"{re.escape(place)}\d+:", message)
 
 
 def test_a_damaged_manifest_is_refused(root):

@@ -23,7 +23,8 @@ BUILD = """<?xml version="1.0"?><fmiBuildDescription fmiVersion="3.0">
 <SourceFileSet><SourceFile name="none.c"/></SourceFileSet>
 </BuildConfiguration>
 <BuildConfiguration modelIdentifier="ball"><SourceFileSet language="C99"><SourceFile name="ball.c"/>
-<PreprocessorDefinition name="FMI" value="3"/></SourceFileSet></BuildConfiguration></fmiBuildDescription>"""
+<PreprocessorDefinition name="FMI" value="3"/></SourceFileSet></BuildConfiguration>
+</fmiBuildDescription>"""
 
 
 #: sources of FMI 1.0 include the headers of the standard, which add the prefix to the names of

@@ -33,9 +33,9 @@ def command(fmus: tuple[Path, ...], as_json: bool) -> int:
                 listed.append(
                     {
                         "file": str(path),
-                        "severity": finding.rule.severity,
-                        "rule": finding.rule.name,
-                        "source": finding.rule.source,
+                        "severity": finding.severity,
+                        "rule": finding.rule,
+                        "source": finding.source,
                         "member": finding.member,
                         "line": finding.line or None,
                         "message": finding.message,
@@ -47,16 +47,16 @@ def command(fmus: tuple[Path, ...], as_json: bool) -> int:
             if not found:
                 click.echo(f"{path}: no findings")
             for finding in found:
-                click.echo(f"{path}: {finding.rule.severity}: {finding}")
+                click.echo(f"{path}: {finding.severity}: {finding}")
     return 2 if any(findings.values()) else 0
 
 
 def _validate_fmu(path: Path) -> Sequence[Finding]:
-    from ...components.fmi.preflight.archive import FILE
+    from ...components.fmi.preflight import Finding
     from ...components.fmi.preflight.validation import validate_fmu
     from ...core.errors import InputError
 
     try:
         return validate_fmu(path)
     except InputError as error:
-        return [FILE(problem.message) for problem in error.problems]
+        return [Finding("archive.file", problem.message) for problem in error.problems]

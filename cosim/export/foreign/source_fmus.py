@@ -6,6 +6,7 @@ They are compiled when they are used, into the user's cache (see `add_binary`).
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -47,7 +48,7 @@ _WINDOWS_HEADERS = {
 #: headers of FMI 1.0, which FMPy does not contain
 _FMI1_HEADERS = ("fmiFunctions.h", "fmiModelFunctions.h", "fmiPlatformTypes.h", "fmiModelTypes.h")
 #: words of the compiler's lines that state a cause
-_ERROR_WORDS = ("error:", "Error:", "undefined reference", "multiple definition", "syntax error")
+_ERROR = re.compile("[eE]rror:|undefined reference|multiple definition|syntax error")
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,11 +139,7 @@ def _compile_library(
     )
     if process.returncode:
         lines = [line.replace(f"{sources}/", "") for line in process.stderr.splitlines()]
-        errors = [
-            line
-            for line in lines
-            if any(words in line for words in _ERROR_WORDS) and "ld returned" not in line
-        ]
+        errors = [line for line in lines if _ERROR.search(line) and "ld returned" not in line]
         more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
         raise InputError(
             f'the sources of "{file.path}" cannot be compiled: '
@@ -181,7 +178,7 @@ def _read_configurations(file: FmuFile, members: Mapping[str, bytes]) -> list[_C
 def _parse(file: FmuFile, members: Mapping[str, bytes], name: str) -> Any:
     """Return the root element of an XML file, which must be safe to parse."""
     try:
-        return parse_xml(members[name], name, file.limits)
+        return parse_xml(members[name], name)
     except FatalFindingError as error:
         raise InputError(f'"{file.path}": {error.finding}') from None
 

@@ -1,7 +1,7 @@
 """Restrictions that a worker process imposes on itself before it loads foreign code.
 
-    enter_sandbox(SandboxSettings(readable=(fmu_folder, *interpreter_folders()),
-    writable=(temporary,), confine="required"))
+    readable = (fmu_folder, *interpreter_folders())
+    enter_sandbox(SandboxSettings(readable, writable=(temporary,), confine="required"))
 
 Always in force:
 

@@ -6,21 +6,22 @@ Each role is a JSON file; the shipped ones are in scenarios/roles/. Paths in it 
 file:
 
     {"description": "...",
-     "controllers": ["../../fmus/strider_autopilot.fmu"],                       components with one
-     of these have the role "inputs": {"vehicle": {"outputs_of": "../../fmus/strider.fmu"},
-     all outputs of an FMU, with this prefix
+     "controllers": ["../../fmus/strider_autopilot.fmu"],
+     "inputs": {"vehicle": {"outputs_of": "../../fmus/strider.fmu"},
                 "target": {"outputs_of": "../../fmus/strider.fmu", "below": "deck"},
-                "altitude_command": "m"},                                       a single variable
-                and its unit
-     "outputs": {"thrust": {"unit": "N", "description": "Positive: forward"}, "rotor_speed[1]":
-     "rad/s"}, "parameters": {"speed_command": "m/s",                                     optional:
-     scenarios set them
-                    "vtol.landing_time": {"unit": "s", "start": 5, "description": "Earliest start of
-                    the approach"}},
-     "goals": ["waypoints.reached", "waypoints.time*"],                         KPIs that rank
-     controllers, the first one first "cost_reference": "../../fmus/ar_drone_geometric.fmu",
-     costs per step are ratios to that of this FMU "stand_ins": {"../../fmus/strider_autopilot.fmu":
-     "../systems/strider_autopilot.json"}}
+                "altitude_command": "m"},
+     "outputs": {"thrust": {"unit": "N", "description": "Positive: forward"},
+                 "rotor_speed[1]": "rad/s"},
+     "parameters": {"speed_command": "m/s",
+                    "vtol.landing_time": {"unit": "s", "start": 5, "description": "..."}},
+     "goals": ["waypoints.reached", "waypoints.time*"],
+     "cost_reference": "../../fmus/ar_drone_geometric.fmu",
+     "stand_ins": {"../../fmus/strider_autopilot.fmu": "../systems/strider_autopilot.json"}}
+
+Components with one of the `controllers` have the role. An entry of `inputs` is a prefix with all
+outputs of an FMU, or a single variable with its unit. `parameters` are optional; scenarios set
+them. `goals` are the KPIs that rank controllers, the first one first. Costs per step are ratios to
+that of the FMU `cost_reference`.
 
 A controller declares the inputs and parameters that it uses; it must have all outputs. A parameter
 without an index stands for an array. A parameter with a prefix may also be declared without it:
@@ -40,7 +41,7 @@ from ...components.fmi import FmuFile
 from ...core import resources
 from ...core.errors import InputError, Problem, did_you_mean
 from ...core.units import Unit, parse_unit
-from ...scenario.json_document import Document, read_document
+from ...scenario.json_document import read_document
 from ...scenario.schema_types import Spec
 
 
@@ -146,35 +147,29 @@ def read_role_file(role: str) -> tuple[Path, RoleSpec]:
 
     The same errors are raised.
     """
-    file = _find_role(role)
-    return file, _validate_role(read_document(file))
+    if role.endswith(".json"):
+        file = Path(role)
+    elif role in role_names():
+        file = resources.root() / "scenarios/roles" / f"{role}.json"
+    else:
+        raise InputError(
+            "there is no role "
+            f'"{role}"{did_you_mean(role, role_names()) or "; valid: " + ", ".join(role_names())}'
+        )
+    document = read_document(file)
+    if document.problems:
+        raise InputError(document.problems)
+    try:
+        return file, RoleSpec.model_validate(document.value)
+    except ValidationError as error:
+        raise InputError(
+            Problem(found["msg"], document.where(found["loc"])) for found in error.errors()
+        ) from None
 
 
 def role_names() -> list[str]:
     """Return the names of the shipped roles."""
     return resources.shipped_names("scenarios/roles/*.json")
-
-
-def _find_role(role: str) -> Path:
-    if role.endswith(".json"):
-        return Path(role)
-    if role not in role_names():
-        raise InputError(
-            "there is no role "
-            f'"{role}"{did_you_mean(role, role_names()) or "; valid: " + ", ".join(role_names())}'
-        )
-    return resources.root() / "scenarios/roles" / f"{role}.json"
-
-
-def _validate_role(document: Document) -> RoleSpec:
-    if document.problems:
-        raise InputError(document.problems)
-    try:
-        return RoleSpec.model_validate(document.value)
-    except ValidationError as error:
-        raise InputError(
-            Problem(found["msg"], document.where(found["loc"])) for found in error.errors()
-        ) from None
 
 
 def _input_units(

@@ -13,7 +13,7 @@ import pytest
 
 from cosim.core.errors import InputError
 from cosim.export.modelica import load_block
-from cosim.export.modelica.frontend import rumoca_client, rumoca_frontend
+from cosim.export.modelica.frontend import model_files, rumoca_client
 
 pytestmark = pytest.mark.slow
 
@@ -114,7 +114,7 @@ def test_a_file_that_is_too_large_or_no_text_is_refused(tmp_path, monkeypatch):
     assert (
         refusal(path) == f"{path}: the file is not UTF-8 text: invalid continuation byte at byte 11"
     )
-    monkeypatch.setattr(rumoca_frontend, "MAX_SOURCE_SIZE", 10)
+    monkeypatch.setattr(model_files, "MAX_SOURCE_SIZE", 10)
     assert refusal(path) == f"{path}: the file has 19 bytes, expected at most 10"
 
 

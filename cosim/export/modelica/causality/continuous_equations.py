@@ -113,10 +113,11 @@ def solve_initial_equations(
     started = (set(assigned) | _previous_values(model)) - fixed
     optional = scalars_of(model, started) - set(written)
     unknowns = scalars_of(model, set(model.variables) - known - started - fixed) - set(written)
+    unknown_names = {name for name, _ in unknowns}
     fixed_unknowns = [
         Equation(Name(v.name), v.start or Literal(0.0, "Real"), v.where)
         for v in model.variables.values()
-        if v.fixed and v.type == "Real" and v.name in {name for name, _ in unknowns}
+        if v.fixed and v.type == "Real" and v.name in unknown_names
     ]
     equations = (*model.equations, *model.initial_equations, *fixed_unknowns)
     system = EquationSystem(model, equations, unknowns, [optional], continues=True)
