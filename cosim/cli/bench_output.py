@@ -74,9 +74,10 @@ def print_trial(result: TrialResult, candidate: str) -> None:
         return
     print_outcome(result.outcome)
     is_verbose = current_command_line().verbosity > 0
-    if result.outcome.code and result.trial.ignored_settings:
-        click.echo(f"        ignored settings: {', '.join(result.trial.ignored_settings)}")
-    applied = settings_text(result.trial.applied_settings)
+    scenario = result.trial.scenario
+    if result.outcome.code and scenario["ignored_settings"]:
+        click.echo(f"        ignored settings: {', '.join(scenario['ignored_settings'])}")
+    applied = settings_text(scenario["applied_settings"])
     if applied and (result.outcome.code or is_verbose):
         click.echo(f"        settings applied: {applied}")
     if is_verbose:

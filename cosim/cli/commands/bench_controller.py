@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -156,7 +156,7 @@ class _Bench:
         from ...studies.controller_bench.page import write_bench_page
 
         trials = self._run_trials(source, settings)
-        write_bench_page(self.role, [trials.as_benched()], self._page)
+        write_bench_page(self.role, [trials], self._page)
         if self.as_json:
             print_json({"role": self.role, **trials.as_json()})
         else:
@@ -182,14 +182,14 @@ class _Bench:
         progress.print_costs()
         reference, costs = self._measure_costs(everything)
         benched = [
-            trials.as_benched(cost, costs[0])
+            replace(trials, cost=cost, cost_ratio=cost / costs[0])
             for trials, cost in zip(everything, costs[1:], strict=True)
         ]
         write_bench_page(self.role, benched, self._page, reference, costs[0])
         if self.as_json:
             shown = [
-                {**trials.as_json(), "cost": each.cost, "cost_ratio": each.cost_ratio}
-                for trials, each in zip(everything, benched, strict=True)
+                {**each.as_json(), "cost": each.cost, "cost_ratio": each.cost_ratio}
+                for each in benched
             ]
             print_json(
                 {

@@ -37,14 +37,14 @@ def command(fmus: tuple[Path, ...], as_json: bool) -> int:
 
 
 def _validate_fmu(path: Path) -> Sequence[Finding]:
-    from ...components.fmi.preflight.archive import FILE
+    from ...components.fmi.preflight import Finding
     from ...components.fmi.preflight.validation import validate_fmu
     from ...core.errors import InputError
 
     try:
         return validate_fmu(path)
     except InputError as error:
-        return [FILE(problem.message) for problem in error.problems]
+        return [Finding("archive.file", problem.message) for problem in error.problems]
 
 
 def _print_findings(findings: Mapping[Path, Sequence[Finding]]) -> None:
@@ -52,15 +52,15 @@ def _print_findings(findings: Mapping[Path, Sequence[Finding]]) -> None:
         if not found:
             click.echo(f"{path}: no findings")
         for finding in found:
-            click.echo(f"{path}: {finding.rule.severity}: {finding}")
+            click.echo(f"{path}: {finding.severity}: {finding}")
 
 
 def _finding_as_json(path: Path, finding: Finding) -> dict[str, Any]:
     return {
         "file": str(path),
-        "severity": finding.rule.severity,
-        "rule": finding.rule.name,
-        "source": finding.rule.source,
+        "severity": finding.severity,
+        "rule": finding.rule,
+        "source": finding.source,
         "member": finding.member,
         "line": finding.line or None,
         "message": finding.message,

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from ....core.component import DTYPES
+from .findings import DESCRIPTION_FILE, Finding
 
 _FLOAT = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?INF|NaN")
 _INTEGER = re.compile(r"[+-]?[0-9]{1,20}")
@@ -150,6 +151,17 @@ class ModelVariable:
 
     def __str__(self) -> str:
         return f'variable "{self.name}"'
+
+
+#: violated rule, variable or line in the file, and what was found and expected
+Violation = tuple[str, ModelVariable | int, str]
+
+
+def to_finding(rule: str, place: ModelVariable | int, message: str) -> Finding:
+    """Return the finding for a violation."""
+    if isinstance(place, int):
+        return Finding(rule, message, DESCRIPTION_FILE, place)
+    return Finding(rule, f"{place}: {message}", DESCRIPTION_FILE, place.line)
 
 
 @dataclass(frozen=True, slots=True)
