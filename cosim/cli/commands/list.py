@@ -69,11 +69,12 @@ def schema(kind: str | None) -> None:
 
 def _schema(kind: str | None) -> dict[str, Any]:
     if kind in ("sweep", "tune", "worst"):
-        from ...studies.schema import SweepSpec, TuneSpec, WorstCaseSpec, study_json_schema
+        from ...scenario.schema_types import schema_of
+        from ...studies.schema import StudySpec, SweepSpec, TuneSpec, WorstCaseSpec
 
-        if kind == "worst":
-            return study_json_schema(WorstCaseSpec)
-        return study_json_schema(SweepSpec if kind == "sweep" else TuneSpec)
+        kinds: dict[str, type[StudySpec]]
+        kinds = {"sweep": SweepSpec, "tune": TuneSpec, "worst": WorstCaseSpec}
+        return schema_of(kinds[kind])
     if kind == "vehicle":
         from ...export.plant import vehicle_file_schema
 
