@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import re
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -174,8 +174,18 @@ class Comparer:
         rows: slice | np.ndarray = slice(None),
     ) -> Tube:
         time = self.points.time[rows]
-        lower, upper = TimeWindows(self._reference.time, time, reach).extremes(reference)
+        windows = (
+            self._windows(reach)
+            if isinstance(rows, slice)
+            else TimeWindows(self._reference.time, time, reach)
+        )
+        lower, upper = windows.extremes(reference)
         return Tube(time, lower - half_width, upper + half_width)
+
+    @cached_property
+    def _windows(self) -> Callable[[float], TimeWindows]:
+        """Windows of some reach (s) around all points; signals with the same reach share them."""
+        return lru_cache(1)(partial(TimeWindows, self._reference.time, self.points.time))
 
     def _half_width(self, name: str, tolerance: Tolerance) -> float:
         return tolerance.half_width(_to_floats(self._reference, name))
