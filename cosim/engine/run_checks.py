@@ -46,7 +46,11 @@ def check_run(system: System, settings: Settings) -> TimeGrid:
     problems += _find_resolution_problems(settings)
     problems += _find_period_problems(system, settings, grid)
     problems += _find_delay_problems(system)
-    problems += _find_event_time_problems(settings.events, grid)
+    for event in settings.events:
+        try:
+            grid.index(event.time)
+        except ValueError as error:
+            problems.append(Problem(f"event time {error}", event.where, subject=("events", "time")))
     if problems:
         raise InputError(problems)
     if not components_with_fixed_steps(system, settings):
@@ -131,14 +135,6 @@ def _find_event_problems(system: System, events: Iterable[Event]) -> Iterator[Pr
             for variable_name in values:
                 if reason := not_settable_reason(name, variables[variable_name], connected):
                     yield Problem(f"{reason}, an event cannot set it", event.where)
-
-
-def _find_event_time_problems(events: Iterable[Event], grid: TimeGrid) -> Iterator[Problem]:
-    for event in events:
-        try:
-            grid.index(event.time)
-        except ValueError as error:
-            yield Problem(f"event time {error}", event.where, subject=("events", "time"))
 
 
 def _fitting_step(system: System, settings: Settings) -> Fraction:
