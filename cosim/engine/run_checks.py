@@ -191,7 +191,13 @@ def _find_period_problems(system: System, settings: Settings, grid: TimeGrid) ->
 
     A too short duration is one problem.
     """
-    yield from _find_recording_problems(settings, grid)
+    interval = settings.record_interval or grid.step
+    if interval < grid.step or (interval / grid.step).denominator != 1:
+        text = (
+            f"recording interval {float(interval)!r} s is no multiple of the step size "
+            f"{float(grid.step)!r} s"
+        )
+        yield Problem(text, subject=("record", "interval"))
     late: dict[str, Fraction] = {}
     for name, period in system.periods.items():
         ratio = period / grid.step
@@ -225,13 +231,3 @@ def _find_delay_problems(system: System) -> Iterator[Problem]:
             f"{format_count(MAX_DELAYED_VALUES)}"
         )
         yield Problem(text, max(stored, key=lambda where: stored[where]), subject=("connections",))
-
-
-def _find_recording_problems(settings: Settings, grid: TimeGrid) -> Iterator[Problem]:
-    interval = settings.record_interval or grid.step
-    if interval < grid.step or (interval / grid.step).denominator != 1:
-        text = (
-            f"recording interval {float(interval)!r} s is no multiple of the step size "
-            f"{float(grid.step)!r} s"
-        )
-        yield Problem(text, subject=("record", "interval"))

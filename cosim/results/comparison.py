@@ -162,16 +162,15 @@ class Comparer:
 
     def tube(self, name: str, tolerance: Tolerance, rows: slice | np.ndarray = slice(None)) -> Tube:
         """Return the tube around a signal of the reference at all `points`, or at some rows."""
-        return self._tube(
-            self.series(name)[1], self._half_width(name, tolerance), tolerance.time, rows
-        )
+        half_width = self._half_width(name, tolerance)
+        return self._tube(self.series(name)[1], half_width, tolerance.time, rows)
 
     def _tube(
         self,
         reference: np.ndarray,
         half_width: float,
         reach: float,
-        rows: slice | np.ndarray = slice(None),
+        rows: slice | np.ndarray,
     ) -> Tube:
         time = self.points.time[rows]
         windows = (
@@ -192,8 +191,7 @@ class Comparer:
 
     def is_outside(self, name: str, tolerance: Tolerance) -> np.ndarray:
         """Return whether the result is outside the tube around a signal, shape (points,)."""
-        values, reference = self.series(name)
-        tube = self._tube(reference, self._half_width(name, tolerance), tolerance.time)
+        values, tube = self.series(name)[0], self.tube(name, tolerance)
         return (values < tube.lower) | (values > tube.upper)
 
     def compare_signal(self, name: str, tolerance: Tolerance) -> Verdict:
@@ -258,7 +256,8 @@ class Comparer:
         ]
         time = np.union1d(covered, other)
         actual, expected = (
-            _sample_and_hold(run, name, time) for run in (self._result, self._reference)
+            run[name][np.searchsorted(run.time, time + time_tolerance(time), "right") - 1]
+            for run in (self._result, self._reference)
         )
         different = np.flatnonzero(actual != expected)
         if not different.size:
@@ -340,11 +339,6 @@ class Comparer:
 
 def _to_floats(run: Result, name: str) -> np.ndarray:
     return run[name].astype(np.float64, copy=False)
-
-
-def _sample_and_hold(run: Result, name: str, time: np.ndarray) -> np.ndarray:
-    """Return the strings that hold at these times (s), shape (times,)."""
-    return run[name][np.searchsorted(run.time, time + time_tolerance(time), "right") - 1]
 
 
 def _relative_excess(distance: float, half_width: float) -> float:

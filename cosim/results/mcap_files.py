@@ -88,8 +88,6 @@ def write_mcap(
         shifted = time - min(float(time[0]), 0.0) if len(time) else time
         times = [round(1e9 * second) for second in shifted.tolist()]
         if scene and len(times):
-            from .mcap_files import log_scene
-
             log_scene(scene, times[0], context)
         _log_poses(recording, times, context)
         _log_signals(recording, times, context)
