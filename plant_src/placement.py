@@ -48,8 +48,8 @@ class VehiclePlacement:
     Attributes:
         name: Name of the vehicle, the prefix of its variables.
         model: Model of the vehicle.
-        parameters: Values of the model's scalar parameters in order; the initial state is among
-            them.
+        parameters: Values of the model's scalar parameters by name, in order; the initial state is
+            among them.
         body: Rigid body in Bullet, with the mass and inertia of these parameters.
         crash_speed: Change of velocity by a collision above which the vehicle has crashed (m/s).
         surface: Friction and restitution in contact.
@@ -57,14 +57,10 @@ class VehiclePlacement:
 
     name: str
     model: Model
-    parameters: Numbers
+    parameters: Mapping[str, float]
     body: Body
     crash_speed: float
     surface: ContactSurface
-
-    def parameter(self, name: str) -> float:
-        """Return the value of a scalar parameter."""
-        return self.parameters[self.model.slots("parameter").index(name)]
 
 
 @dataclass(frozen=True)

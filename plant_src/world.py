@@ -22,11 +22,12 @@ from cosim.core.errors import ComponentError, InputError, Problem, did_you_mean
 from . import world_settings
 from .catalogue import BINARIES
 from .environment.environment_model import EnvironmentModel
-from .physics.body import ContactBody, InvalidStateError
+from .physics.body import InvalidStateError
 from .physics.bullet import connect, create_fixed_bodies, preconnect, pybullet
 from .physics.compiled_equations import library_path
 from .physics.contacts import FLAG_COUNT, overlap_depths
 from .physics.fleet import Fleet, FleetState
+from .placement import VehiclePlacement
 from .variable_views import recorded_others, variable_views, views_in_parts
 from .vehicle_files.plausibility import placement_warnings
 from .vehicles.otter.parameters import MAX_PROPELLER_SPEED, MIN_PROPELLER_SPEED
@@ -52,21 +53,21 @@ _FIXED = {
 }
 
 
-def vehicle_constants(body: ContactBody, pointer: str) -> Iterator[tuple[Variable, np.ndarray]]:
+def vehicle_constants(
+    vehicle: VehiclePlacement, pointer: str
+) -> Iterator[tuple[Variable, np.ndarray]]:
     """Yield the parameters of a vehicle as constants that `pointer` sets.
 
     Those of initial state and waves are left out.
     """
-    for variable, values in variable_views(
-        body.model.real_variables("parameter"), {DTYPES["Float64"]: body.parameters}
-    ):
+    for variable in vehicle.model.real_variables("parameter"):
         if not variable.name.startswith((INITIAL_PREFIX, WAVE_PREFIX)):
+            values = np.array([vehicle.parameters[name] for name in variable.scalar_names])
             value = values.tolist() if variable.shape else values.item()
-            name = f"{body.name}.{variable.name}"
             text = f"{variable.description}; set by {pointer}/{variable.name}"
             constant = replace(
                 variable,
-                name=name,
+                name=f"{vehicle.name}.{variable.name}",
                 causality="local",
                 variability="constant",
                 start=value,
@@ -75,18 +76,18 @@ def vehicle_constants(body: ContactBody, pointer: str) -> Iterator[tuple[Variabl
             yield constant, values
 
 
-def input_limits(body: ContactBody) -> Iterator[tuple[str, tuple[float, float]]]:
+def input_limits(vehicle: VehiclePlacement) -> Iterator[tuple[str, tuple[float, float]]]:
     """Yield name and limits of each limited scalar input of a vehicle, in its unit.
 
     Inputs without an actuator, such as the angle of a fixed rudder, are left out.
     """
-    parameters = dict(zip(body.model.slots("parameter"), body.parameters.tolist(), strict=True))
-    for variable in body.model.real_variables("input"):
+    for variable in vehicle.model.real_variables("input"):
         if variable.name in _PARAMETERS:
             for scalar in variable.scalar_names:
-                low, high = _limits(variable.name, scalar.removeprefix(variable.name), parameters)
+                subscript = scalar.removeprefix(variable.name)
+                low, high = _limits(variable.name, subscript, vehicle.parameters)
                 if low < high:
-                    yield f"{body.name}.{scalar}", (low, high)
+                    yield f"{vehicle.name}.{scalar}", (low, high)
 
 
 def _limits(command: str, subscript: str, parameters: Mapping[str, float]) -> tuple[float, float]:
@@ -169,7 +170,8 @@ class World(Component):
             self.free()
             raise
         self._variables_by_name = {
-            variable.name: (variable, values) for variable, values in self._variables_with_values()
+            variable.name: (variable, values)
+            for variable, values in self._variables_with_values(settings.vehicles)
         }
         self.variables = [variable for variable, _ in self._variables_by_name.values()]
 
@@ -219,9 +221,6 @@ class World(Component):
         self._check_overlaps(
             fixed.paths | {body.body_id: f"vehicles.{body.name}" for body in self._fleet.bodies}
         )
-        self.input_limits = {}
-        for body in self._fleet.bodies:
-            self.input_limits |= dict(input_limits(body))
         self._environment = EnvironmentModel(
             settings.environment,
             settings.sea,
@@ -230,8 +229,9 @@ class World(Component):
             self._fleet.bodies,
         )
         self._has_environment = bool(self._environment.update_functions)
-        self.warnings = []
+        self.input_limits, self.warnings = {}, []
         for vehicle in settings.vehicles:
+            self.input_limits |= dict(input_limits(vehicle))
             self.warnings += placement_warnings(vehicle)
         for name in self._environment.vessels_without_wave_motion:
             component_log.log_message(
@@ -259,9 +259,11 @@ class World(Component):
         if problems:
             raise InputError(problems)
 
-    def _variables_with_values(self) -> Iterator[tuple[Variable, np.ndarray]]:
+    def _variables_with_values(
+        self, vehicles: Sequence[VehiclePlacement]
+    ) -> Iterator[tuple[Variable, np.ndarray]]:
         """Yield every variable with a view of its values."""
-        for body, flags in zip(self._fleet.bodies, self._flags, strict=True):
+        for vehicle, body, flags in zip(vehicles, self._fleet.bodies, self._flags, strict=True):
             prefixed = body.model.variables_of(body.name)
             yield from views_in_parts([v for v in prefixed if v.causality == "input"], body.inputs)
             yield from variable_views(
@@ -269,7 +271,7 @@ class World(Component):
                 {_FLOAT: body.outputs, _FLAG: flags},
             )
             yield from vehicle_constants(
-                body, f"/components/{self._name}/arguments/vehicles/{body.name}/parameters"
+                vehicle, f"/components/{self._name}/arguments/vehicles/{body.name}/parameters"
             )
         environment = self._environment
         yield from variable_views(environment.input_variables, {_FLOAT: environment.inputs})

@@ -124,12 +124,7 @@ class _WorldSettingsReader(JsonReader):
             spec.get("crash_speed", model.crash_speed), (*path, "crash_speed"), 0.0
         )
         return VehiclePlacement(
-            name,
-            model,
-            tuple(parameters.values()),
-            body,
-            crash_speed,
-            read_surface(self, spec, path),
+            name, model, parameters, body, crash_speed, read_surface(self, spec, path)
         )
 
     def read_hull(self, model: Model, spec: Mapping[str, Any], path: JsonPath) -> dict[str, float]:
@@ -249,13 +244,10 @@ class _WorldSettingsReader(JsonReader):
 
 def _with_waves(sea: Sea, vehicle: VehiclePlacement) -> VehiclePlacement:
     """Return the vehicle with its wave parameters set, if its model has any."""
-    parameters = dict(zip(vehicle.model.slots("parameter"), vehicle.parameters, strict=True))
-    if f"{WAVE_PREFIX}count" not in parameters:
+    if f"{WAVE_PREFIX}count" not in vehicle.parameters:
         return vehicle
-    parameters[f"{WAVE_PREFIX}count"] = float(len(sea.amplitude))
+    waves = {f"{WAVE_PREFIX}count": float(len(sea.amplitude))}
     for name in ("amplitude", "frequency", "direction", "phase"):
-        parameters |= {
-            f"{WAVE_PREFIX}{name}[{k}]": value
-            for k, value in enumerate(getattr(sea, name).tolist(), start=1)
-        }
-    return replace(vehicle, parameters=tuple(parameters.values()))
+        for k, value in enumerate(getattr(sea, name).tolist(), start=1):
+            waves[f"{WAVE_PREFIX}{name}[{k}]"] = value
+    return replace(vehicle, parameters={**vehicle.parameters, **waves})

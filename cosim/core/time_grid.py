@@ -1,7 +1,7 @@
 """The time base of a run: exact communication points and their times in seconds.
 
-A communication point is an integer on a grid of exact fractions. Its time is rounded once, here and
-nowhere else: the executors receive their times from `TimeGrid.times`. Every recorded row has its
+A communication point is an integer on a grid of exact fractions. Its time is rounded once: here, or
+in the native executor by the same formula (`TimeGrid.coefficients`). Every recorded row has its
 time as float64, so that readers of rows need no grid. A row may also lie between two communication
 points, and several rows may have the same time (the limits before and after an event).
 """
@@ -149,21 +149,26 @@ class TimeGrid:
         The division is the only rounding, as long as float64 represents the numerators exactly.
         Otherwise Python's integers are divided, which it does with one rounding.
         """
-        if end - first < MIN_VECTOR_LENGTH or not self._is_exact(end):
+        if end - first < MIN_VECTOR_LENGTH or not self.coefficients(end - 1):
             return np.array([self.time_at(n) for n in range(first, end)], np.float64)
-        begin, stride = self._origin + first * self._stride, self._stride
-        times: np.ndarray = np.arange(
-            begin, begin + (end - first) * stride, stride, dtype=np.float64
-        )
-        times /= self._denominator
-        if self._stop is not None:
-            times[max(0, self.count - first) :] = float(self._stop)
+        points = np.arange(first, end, dtype=np.float64)
+        times: np.ndarray = (self._origin + points * self._stride) / self._denominator
         return times
 
-    def _is_exact(self, end: int) -> bool:
-        """Return whether float64 represents all terms of the times before point `end` exactly."""
-        terms = self._origin, self._denominator, end * self._stride
-        return max(map(abs, (*terms, self._origin + end * self._stride))) <= MAX_TIME
+    def coefficients(self, last: int) -> tuple[float, float, float] | None:
+        """Return origin, stride, denominator of the times (origin + n * stride) / denominator.
+
+        Args:
+            last: The last communication point for which the formula is needed.
+
+        Returns:
+            None if the last step is shorter, or float64 rounds more than the quotient up to `last`.
+        """
+        if self._stop is not None and last >= self.count:
+            return None
+        origin, reach = self._origin, last * self._stride
+        largest = max(abs(origin), abs(origin + reach), reach, self._denominator)
+        return (origin, self._stride, self._denominator) if largest <= MAX_TIME else None
 
     @property
     def end(self) -> Fraction:

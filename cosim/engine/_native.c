@@ -29,7 +29,7 @@ static unsigned x87_control(void) {
     return word;
 }
 
-enum { INTERFACE = 8 };                              /* also in native_executor.py, where it is described */
+enum { INTERFACE = 9 };                              /* also in native_executor.py, where it is described */
 enum { WARNING = 1, DISCARD = 2 };                   /* FMI statuses; 0 is OK, everything but OK and WARNING is bad */
 /* Codes passed to `on_status` like an FMI status. They exceed 32 bits, so no FMU can return them. */
 #define FLOAT_MODE_CHANGED (INT64_C(1) << 33)
@@ -482,7 +482,7 @@ static int record_row(Program *p, int64_t n, double time) {
         return result ? 0 : -1;
     }
     if (p->buffer) memcpy(p->row + sizeof time, p->buffer, (size_t)p->buffer_size);
-    copy_row_parts(p);
+    else copy_row_parts(p);
     *(volatile double *)p->row = time;
     p->row += p->row_size;
     p->marker[MARKER_ROWS]++;
@@ -693,19 +693,22 @@ static int check_signals(Program *p) {
 
 static bool traps_changed(const Program *p) { return sse_control() != p->sse_control; }
 
-/* Run macro steps first, first + 1, ... until the chunk of rows is full. `times` are those of the communication points from
-   `first` on. */
-static int run_macro_steps(Program *p, int64_t first, int64_t count, const double *times) {
+/* Run macro steps first, first + 1, ... until the chunk of rows is full. Step `first` begins at `next_time`; the communication
+   points n after it are at (origin + n * stride) / denominator. These numbers and n * stride are integers that a double
+   represents exactly, so the division is the only rounding. */
+static int run_macro_steps(Program *p, int64_t first, int64_t count, double next_time, double origin, double stride,
+                           double denominator) {
     const int64_t steps_per_check = macro_steps_per_signal_check(p);
     int64_t left = steps_per_check;
     for (int64_t n = first; n < first + count && !p->end_request; n++) {
-        double time = *times++;
+        double time = next_time;
+        next_time = (origin + (double)(n + 1) * stride) / denominator; /* the division takes its time during the step */
         *p->current_time = time;
         if (run_macro_step(p, n, time) < 0) return -1;
         if (p->end_request == END_BEFORE_STEP) return 0;
         if ((n + 1) % TRAP_CHECK_INTERVAL == 0 && traps_changed(p) && report_status(p, -1, FLOAT_TRAPS_ENABLED) < 0) return -1;
         if (!all_finite(p) && report_status(p, -1, NOT_FINITE) < 0) return -1;
-        if (record_row(p, n + 1, *times) < 0) return -1;
+        if (record_row(p, n + 1, next_time) < 0) return -1;
         p->marker[MARKER_STEPS] = n + 1;
         if (report_changed_conditions(p, n + 1) < 0) return -1;
         if (--left < 0) {
@@ -717,21 +720,17 @@ static int run_macro_steps(Program *p, int64_t first, int64_t count, const doubl
 }
 
 static PyObject *run(Program *p, PyObject *arguments) {
-    long long first;
-    Py_buffer times;
-    if (!PyArg_ParseTuple(arguments, "Ly*", &first, &times)) return NULL;
+    long long first, count;
+    double time, origin, stride, denominator;
+    if (!PyArg_ParseTuple(arguments, "LLdddd", &first, &count, &time, &origin, &stride, &denominator)) return NULL;
     p->end_request = CONTINUE;
     p->sse_control = sse_control();
     p->x87_control = x87_control();
-    int failed = !p->is_packed && all_steps_measured(p) && pack_steps(p) < 0;
-    if (!failed) {
-        release_gil(p);
-        failed = run_macro_steps(p, first, times.len / (Py_ssize_t)sizeof(double) - 1, times.buf);
-        if (!failed && (traps_changed(p) || x87_control() != p->x87_control))
-            failed = report_status(p, -1, FLOAT_TRAPS_ENABLED);
-        acquire_gil(p);
-    }
-    PyBuffer_Release(&times);
+    if (!p->is_packed && all_steps_measured(p) && pack_steps(p) < 0) return NULL;
+    release_gil(p);
+    int failed = run_macro_steps(p, first, count, time, origin, stride, denominator);
+    if (!failed && (traps_changed(p) || x87_control() != p->x87_control)) failed = report_status(p, -1, FLOAT_TRAPS_ENABLED);
+    acquire_gil(p);
     if (failed) return NULL;
     Py_RETURN_NONE;
 }
@@ -1031,7 +1030,7 @@ static PyMethodDef methods[] = {
     {"step_durations", (PyCFunction)step_durations, METH_NOARGS,
      "Return (call number, shortest duration in ns) of all doStep calls."},
     {"run", (PyCFunction)run, METH_VARARGS,
-     "Run macro steps from number `first`; `times` are the float64 times of their communication points."},
+     "Run `count` macro steps from `first`, at `time`; later points n are at (origin + n * stride) / denominator (s)."},
     {NULL, NULL, 0, NULL},
 };
 

@@ -1,8 +1,6 @@
 from collections.abc import Callable
 from typing import Any, Final
 
-import numpy as np
-
 INTERFACE: Final[int]
 #: codes that `on_status` receives beside FMI statuses; they exceed 32 bits
 FLOAT_MODE_CHANGED: Final[int]
@@ -114,4 +112,13 @@ class Program:
     def set_wake_point(self, point: int, /) -> None: ...
     def set_rows(self, address: int, count: int, /) -> None: ...
     def step_durations(self) -> list[tuple[int, int]]: ...
-    def run(self, first: int, times: np.ndarray, /) -> None: ...
+    def run(
+        self,
+        first: int,
+        count: int,
+        time: float,
+        origin: float,
+        stride: float,
+        denominator: float,
+        /,
+    ) -> None: ...

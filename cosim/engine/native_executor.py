@@ -22,12 +22,12 @@ except ImportError:  # installed without a C compiler
 
 #: number of the interface of `_native.c`; raised with every change of a function, an argument, a
 #: code or the marker
-INTERFACE = 8
+INTERFACE = 9
 #: average number of values in contiguous runs from which a run is copied as a block of memory
 MIN_BLOCK_VALUES = 8
-#: most macro steps per call, whose times stay in the cache of the processor; the first call is
-#: shorter, because it measures the durations of the steps
-MAX_STEPS_PER_CALL = 1 << 15
+#: most macro steps per call; the first call is shorter, because it measures the durations of the
+#: steps
+MAX_STEPS_PER_CALL = 1 << 16
 
 
 def native_available() -> bool:
@@ -165,10 +165,14 @@ class NativeExecutor(Executor):
         self._use_rows()
 
     def _run_macro_steps(self, first: int, end: int) -> None:
+        grid = self.plan.grid
         end = min(end, first + self._steps_per_call(first))
+        coefficients = grid.coefficients(end)
+        if coefficients is None:
+            end, coefficients = first + 1, (grid.time_at(first + 1), 0.0, 1.0)
         self._use_rows()
         self._program.set_wake_point(self.stop_conditions.wake_point)
-        self._program.run(first, self.plan.grid.times(first, end + 1))
+        self._program.run(first, end - first, grid.time_at(first), *coefficients)
 
     def _use_rows(self) -> None:
         """Pass the memory of the next rows to the program, which writes them unless Python does."""

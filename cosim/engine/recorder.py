@@ -48,7 +48,7 @@ class RowPart(NamedTuple):
 class Recorder:
     """Stores the values of the recorded outputs.
 
-    The signals of a row are a copy of the whole output buffer if at least half of it is recorded;
+    The signals of a row are a copy of the whole output buffer if more than half of it is recorded;
     otherwise a row contains only the recorded values. Strings and binaries are stored in memory,
     apart from the rows.
 
@@ -73,7 +73,7 @@ class Recorder:
         )
         #: a row contains a copy of the whole output buffer
         recorded_bytes = sum(position.dtype.itemsize for position in numeric)
-        self.whole_buffer = 2 * recorded_bytes >= plan.outputs.buffer.nbytes > 0
+        self.whole_buffer = 2 * recorded_bytes > plan.outputs.buffer.nbytes
         #: the parts of a row otherwise
         self.row_parts: Sequence[RowPart] = (
             () if self.whole_buffer else list(self._pack_row(numeric))

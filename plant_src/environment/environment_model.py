@@ -184,8 +184,8 @@ def _bodies_with_input(bodies: Sequence[ContactBody], name: str) -> list[Contact
 
 def _air_drag(vehicle: VehiclePlacement) -> list[float]:
     """Return the coefficients of air drag of a vehicle; [1] if they are no parameters."""
-    values = zip(vehicle.model.slots("parameter"), vehicle.parameters, strict=True)
-    return [value for name, value in values if name.startswith(AIR_DRAG_PARAMETERS)] or [1.0]
+    parameters = vehicle.parameters.items()
+    return [value for name, value in parameters if name.startswith(AIR_DRAG_PARAMETERS)] or [1.0]
 
 
 def _set_all(inputs: Sequence[Any], value: float) -> None:
@@ -239,5 +239,5 @@ def _multirotors_in_ground_effect(
         body
         for vehicle, body in zip(vehicles, bodies, strict=True)
         if body in _bodies_with_input(bodies, "ground_distance")
-        and vehicle.parameter("ground_effect")
+        and vehicle.parameters["ground_effect"]
     ]

@@ -109,7 +109,6 @@ class ContactBody:
         }
         self.inputs = [arrays["inputs"][place] for place in vehicle.model.input_places]
         self.outputs = arrays["outputs"]
-        self.parameters = np.array(vehicle.parameters)
         self.environment_inputs = arrays["environment_inputs"]
         self.environment_inputs[:] = [
             variable.start for variable in vehicle.model.environment_inputs

@@ -102,8 +102,8 @@ class World(Component):
         pybullet.setGravity(0, 0, -9.81, physicsClientId=self._client)
         for platform in platforms:
             _add_platform(self._client, platform)
-        self._quadcopter = Quadcopter(self._client, vehicles["uav"].parameters)
-        self._vessel = Vessel(self._client, vehicles["usv"].parameters)
+        self._quadcopter = Quadcopter(self._client, tuple(vehicles["uav"].parameters.values()))
+        self._vessel = Vessel(self._client, tuple(vehicles["usv"].parameters.values()))
         self._check_overlaps()
         self._acceleration_integral = np.zeros(3)
         self._publish(math.inf)  # an infinite step makes the first difference quotient zero

@@ -49,7 +49,7 @@ def placement_warnings(vehicle: VehiclePlacement) -> Iterator[Problem]:
     path = ("arguments", "vehicles", vehicle.name)
     for each in vehicle_warnings(vehicle.model):
         yield replace(each, subject=(*path, "model", *each.subject[1:]))
-    if abs(yaw := vehicle.parameter("initial.yaw")) > 2 * math.pi:
+    if abs(yaw := vehicle.parameters["initial.yaw"]) > 2 * math.pi:
         yield Problem(
             f"found {yaw:g}, radians expected; in degrees? A right angle is 1.5708",
             subject=(*path, "yaw"),

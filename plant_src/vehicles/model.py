@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import chain, islice
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -148,17 +148,15 @@ class Model:
                 places.append(slice(start, start + count))
         return places
 
-    def equation_parameters(self, values: Sequence[float]) -> list[float]:
-        """Return the parameters of the equations for the parameters of the interface.
+    def equation_parameters(self, values: Mapping[str, float]) -> list[float]:
+        """Return the parameters of the equations for the parameters of the interface, by name.
 
         Arrays are filled up with zeros.
         """
-        remaining, result = iter(values), list[float]()
-        counts = {variable.name: len(variable.scalar_names) for variable in self.interface}
+        result = list[float]()
         for variable in self.layout or self.interface:
             if variable.causality == "parameter":
-                count = counts.get(variable.name, 0)
-                result += [*islice(remaining, count), *[0.0] * (len(variable.scalar_names) - count)]
+                result += [values.get(name, 0.0) for name in variable.scalar_names]
         return result
 
     def real_variables(self, causality: Causality) -> list[Variable]:

@@ -14,7 +14,7 @@ from cosim.components.fmi import FmuFile, Isolation, create_component
 from cosim.core.component import DTYPES, Variable
 from cosim.core.errors import ComponentError
 from cosim.core.system import FLOAT_TYPES, Connection, Endpoint, Group, System, incompatibility
-from cosim.core.time_grid import exact_fraction
+from cosim.core.time_grid import TimeGrid, exact_fraction
 from cosim.core.units import parse_unit
 from cosim.engine import EXECUTORS, native_available, parallel
 from cosim.engine.plan_run import simulate
@@ -379,6 +379,19 @@ def test_the_time_is_exact_between_recorded_rows(kind):
     )
     assert str(outcome.failure).endswith("is nan, and is recorded for t = 0.06 s")
     assert outcome.recording.time.tolist() == [0]
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+@pytest.mark.parametrize("start", [-1, 2**24], ids=["exact terms", "terms above 2**53"])
+def test_rows_have_the_times_of_the_grid(kind, start):
+    grid = TimeGrid.from_times(
+        Fraction(start), Fraction(start + 100), Fraction(1_000_000_007, 1_000_000_009)
+    )
+    assert (grid.coefficients(grid.count) is None) == (start > 0)
+    source = FakeComponent([Variable("y0", causality="output")], lambda *_: None)
+    settings = Settings(grid.start, grid.end, grid.step, {"a.y0": endpoint("a.y0")}, executor=kind)
+    recorded = simulate(make_system({"a": source}), settings).recording.time
+    assert recorded.tolist() == [grid.time_at(n) for n in range(grid.count + 1)]
 
 
 @pytest.mark.parametrize("kind", EXECUTORS)

@@ -261,16 +261,3 @@ def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     raise AssertionError(
         "one of the 24 frames of the principal axes is rotated by less than 63 degrees"
     )
-
-
-def principal_body(mass: float, inertia: np.ndarray, boxes: Boxes) -> Body:
-    """Return a rigid body for Bullet, in its principal axes.
-
-    Args:
-        mass: Mass (kg).
-        inertia: Inertia tensor about the centre of mass (kg m2, body frame), shape (3, 3).
-        boxes: Collision shape.
-    """
-    moments, to_body = principal_axes(inertia)
-    x, y, z = moments.tolist()
-    return Body(mass, (x, y, z), boxes(to_body), axes=quaternion_from_matrix(to_body))

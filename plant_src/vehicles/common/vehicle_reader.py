@@ -10,18 +10,29 @@ source:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
-from cosim.core.errors import InputError, abbreviate_names
+from cosim.core.errors import InputError, Problem, abbreviate_names
 from cosim.core.units import KNOWN_UNITS, PREFIXED, Unit, parse_unit
 
 from ...json_reader import JsonPath, JsonReader, Numbers
-from .shapes import BODY_UP, Body, Boxes, ConvexPiece, Shape, Vector, level_box
+from .shapes import (
+    BODY_UP,
+    Body,
+    Boxes,
+    ConvexPiece,
+    Shape,
+    Vector,
+    inertia_problems,
+    level_box,
+    principal_axes,
+    quaternion_from_matrix,
+)
 
 #: keys that every object of vehicle data may have; they are texts for the reader of the file
 TEXT_KEYS = ("source", "note")
@@ -270,13 +281,70 @@ def read_triangles(reader: JsonReader, value: Any, path: JsonPath) -> np.ndarray
     return triangles
 
 
-class Vehicle(Protocol):
-    """A vehicle that is given by data: a dataclass."""
+@dataclass(frozen=True)
+class Vehicle:
+    """A vehicle that is given by data.
 
-    __dataclass_fields__: ClassVar[dict[str, Any]]
+    Attributes:
+        kind: Kind of vehicle, for messages.
+        name: Name of the model.
+        mass: Total mass (kg).
+
+    Raises:
+        InputError: For physically impossible values, all together; a problem's subject begins with
+            the name of the attribute.
+    """
+
+    kind: ClassVar[str]
+    name: str
+    mass: float
+
+    def __post_init__(self) -> None:
+        if problems := list(self.problems()):
+            raise InputError(problems)
+
+    def problems(self) -> Iterator[Problem]:
+        """Yield what is physically impossible."""
+        yield from self.size_problems("mass")
+
+    def size_problems(self, *names: str) -> Iterator[Problem]:
+        """Yield a problem for each of the attributes that is not finite or not greater than 0."""
+        for name in names:
+            if not 0 < (value := getattr(self, name)) < math.inf:
+                text = f"found {value!r}, expected a finite number greater than 0"
+                yield self.problem(text, name)
+
+    def problem(self, text: str, *subject: str) -> Problem:
+        """Return a problem of an attribute."""
+        return Problem(text, f"{self.kind} {self.name}: {'.'.join(subject)}", subject)
 
     def body(self, boxes: Boxes) -> Body:
         """Return the rigid body for Bullet with this collision shape."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class FreeVehicle(Vehicle):
+    """A vehicle that moves freely in six degrees of freedom.
+
+    Attributes:
+        inertia: Inertia tensor about the centre of mass (kg m2, body frame), shape (3, 3); that of
+            a multirotor has locked rotors.
+    """
+
+    inertia: np.ndarray
+
+    def body(self, boxes: Boxes) -> Body:
+        """Return the rigid body for Bullet, in its principal axes."""
+        moments, to_body = principal_axes(self.inertia)
+        x, y, z = moments.tolist()
+        axes = quaternion_from_matrix(to_body)
+        return Body(self.mass, (x, y, z), boxes(to_body), axes=axes)
+
+    def inertia_problems(self) -> Iterator[Problem]:
+        """Yield a problem if no rigid body has this inertia."""
+        for text in inertia_problems(self.inertia):
+            yield self.problem(text, "inertia")
 
 
 _Vehicle = TypeVar("_Vehicle", bound=Vehicle)

@@ -12,11 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from cosim.core.errors import InputError, Problem
+from cosim.core.errors import Problem
 
 from ...json_reader import JsonPath
-from ..common.shapes import BODY_UP, Body, Boxes, Vector, inertia_problems, principal_body
-from ..common.vehicle_reader import TORQUE_SIGNS, Collision, VehicleReader, edges_around
+from ..common.shapes import BODY_UP, Vector
+from ..common.vehicle_reader import (
+    TORQUE_SIGNS,
+    Collision,
+    FreeVehicle,
+    VehicleReader,
+    edges_around,
+)
 
 #: largest number of rotors
 MAX_ROTORS = 16
@@ -87,40 +93,25 @@ class Hull:
 
 
 @dataclass(frozen=True)
-class Airframe:
+class Airframe(FreeVehicle):
     """A rigid body with rotors.
 
     Attributes:
-        name: Name of the model.
-        mass: Total mass (kg).
-        inertia: Inertia tensor about the centre of mass with locked rotors (kg m2, body frame),
-            shape (3, 3).
         rotors: All rotors, at most MAX_ROTORS.
         max_rotor_speed: Upper limit of the rotor speeds (rad/s); the lower limit is 0.
         rotor_radius: Radius of a rotor (m).
         effects: Start values of the further effects.
         gravity: Gravitational acceleration (m/s2).
         hull: The body in water.
-
-    Raises:
-        InputError: For physically impossible values, all together; a problem's subject begins with
-            the name of the attribute.
     """
 
-    name: str
-    mass: float
-    inertia: np.ndarray
+    kind = "airframe"
     rotors: Sequence[Rotor]
     max_rotor_speed: float
     rotor_radius: float
     effects: RotorEffects = field(default_factory=RotorEffects)
     gravity: float = 9.81
     hull: Hull = field(default_factory=Hull)
-
-    def __post_init__(self) -> None:
-        problems = [*self._number_problems(), *self._inertia_problems(), *self._rotor_problems()]
-        if problems:
-            raise InputError(problems)
 
     @property
     def rotor_disc(self) -> tuple[Vector, float]:
@@ -136,26 +127,17 @@ class Airframe:
             rotor.thrust_coefficient * rotor.axis[2] for rotor in self.rotors
         )
 
-    def _problem(self, text: str, *subject: str) -> Problem:
-        return Problem(text, f"airframe {self.name}: {'.'.join(subject)}", subject)
-
-    def _number_problems(self) -> Iterator[Problem]:
-        for name in ("mass", "max_rotor_speed", "rotor_radius", "gravity"):
-            if not 0 < (value := getattr(self, name)) < math.inf:
-                text = f"found {value!r}, expected a finite number greater than 0"
-                yield self._problem(text, name)
+    def problems(self) -> Iterator[Problem]:
+        """Yield what is physically impossible."""
+        yield from self.size_problems("mass", "max_rotor_speed", "rotor_radius", "gravity")
         for part in ("effects", "hull"):
             for name, value in vars(getattr(self, part)).items():
                 if not all(0 <= number < math.inf for number in np.ravel(value)):
                     text = f"found {value!r}, expected finite numbers of at least 0"
-                    yield self._problem(text, part, name)
-
-    def _inertia_problems(self) -> Iterator[Problem]:
-        return (self._problem(text, "inertia") for text in inertia_problems(self.inertia))
-
-    def _rotor_problems(self) -> Iterator[Problem]:
+                    yield self.problem(text, part, name)
+        yield from self.inertia_problems()
         if not 1 <= len(self.rotors) <= MAX_ROTORS:
-            yield self._problem(
+            yield self.problem(
                 f"found {len(self.rotors) or 'none'}, expected 1 to {MAX_ROTORS}", "rotors"
             )
         for number, rotor in enumerate(self.rotors, 1):
@@ -163,19 +145,15 @@ class Airframe:
             for coefficient in ("thrust_coefficient", "torque_coefficient"):
                 if not 0 <= (value := getattr(rotor, coefficient)) < math.inf:
                     text = f"found {value!r}, expected a finite number of at least 0"
-                    yield self._problem(text, name, coefficient)
+                    yield self.problem(text, name, coefficient)
             if rotor.torque_sign not in (1, -1):
                 text = f"found {rotor.torque_sign!r}, expected 1 or -1"
-                yield self._problem(text, name, "torque_sign")
+                yield self.problem(text, name, "torque_sign")
             if not math.isclose(math.hypot(*rotor.axis), 1, rel_tol=1e-9):
-                yield self._problem(f"found {rotor.axis}, expected a unit vector", name, "axis")
+                yield self.problem(f"found {rotor.axis}, expected a unit vector", name, "axis")
             if not all(map(math.isfinite, rotor.position)):
                 text = f"found {rotor.position}, expected finite numbers"
-                yield self._problem(text, name, "position")
-
-    def body(self, boxes: Boxes) -> Body:
-        """Return the rigid body for Bullet, in the principal axes."""
-        return principal_body(self.mass, self.inertia, boxes)
+                yield self.problem(text, name, "position")
 
 
 #: required keys of the file

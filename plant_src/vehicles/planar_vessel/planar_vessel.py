@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -36,9 +35,7 @@ class PlanarVessel(Boat):
     def problems(self) -> Iterator[Problem]:
         """Yield what is physically impossible."""
         yield from super().problems()
-        if not 0 < self.yaw_inertia < math.inf:
-            text = f"found {self.yaw_inertia!r}, expected a finite number greater than 0"
-            yield self.problem(text, "yaw_inertia")
+        yield from self.size_problems("yaw_inertia")
         diagonal = [float(matrix[k, k]) for k, matrix in enumerate(self.quadratic_damping)]
         if min(diagonal) < 0:
             found = f"found the coefficients {diagonal} of |u| u, |v| v and |r| r"

@@ -13,19 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from cosim.core.errors import InputError, Problem
+from cosim.core.errors import Problem
 
 from ...json_reader import JsonPath
-from ..common.shapes import (
-    Body,
-    Boxes,
-    Vector,
-    eigenvalue_problems,
-    inertia_problems,
-    principal_body,
-    symmetry_problems,
+from ..common.shapes import Vector, eigenvalue_problems, symmetry_problems
+from ..common.vehicle_reader import (
+    TORQUE_SIGNS,
+    Collision,
+    FreeVehicle,
+    VehicleReader,
+    edges_around,
 )
-from ..common.vehicle_reader import TORQUE_SIGNS, Collision, VehicleReader, edges_around
 
 #: largest number of thrusters
 MAX_THRUSTERS = 16
@@ -61,13 +59,10 @@ class Thruster:
 
 
 @dataclass(frozen=True)
-class Craft:
-    """A rigid body in water with thrusters.
+class Craft(FreeVehicle):
+    """A rigid body in water with thrusters; its mass contains the water in free-flooding spaces.
 
     Attributes:
-        name: Name of the model.
-        mass: Total mass with the water in free-flooding spaces (kg).
-        inertia: Inertia tensor about the centre of mass (kg m2, body frame), shape (3, 3).
         displaced_volume: Volume of water that the submerged vehicle displaces (m3).
         centre_of_buoyancy: Centre of this volume (m, body frame).
         size: Edges of the box over which this volume is distributed (m); it matters at the surface
@@ -83,15 +78,9 @@ class Craft:
         advance_coefficient: Loss of thrust over speed and axial velocity of the water (kg/rad).
         gravity: Gravitational acceleration (m/s2).
         water_density: Density of the water (kg/m3).
-
-    Raises:
-        InputError: For physically impossible values, all together; a problem's subject begins with
-            the name of the attribute.
     """
 
-    name: str
-    mass: float
-    inertia: np.ndarray
+    kind = "submerged vehicle"
     displaced_volume: float
     centre_of_buoyancy: Vector
     size: Vector
@@ -106,44 +95,23 @@ class Craft:
     gravity: float = 9.81
     water_density: float = 1025.0
 
-    def __post_init__(self) -> None:
-        if problems := [
-            *self._inertia_problems(),
-            *self._matrix_problems(),
-            *self._thruster_problems(),
-        ]:
-            raise InputError(problems)
-
-    def _problem(self, text: str, *subject: str) -> Problem:
-        return Problem(text, f"submerged vehicle {self.name}: {'.'.join(subject)}", subject)
-
-    def _inertia_problems(self) -> Iterator[Problem]:
-        if not 0 < self.mass < math.inf:
-            text = f"found {self.mass!r}, expected a finite number greater than 0"
-            yield self._problem(text, "mass")
-        yield from (self._problem(text, "inertia") for text in inertia_problems(self.inertia))
-
-    def _matrix_problems(self) -> Iterator[Problem]:
-        yield from (
-            self._problem(text, "added_mass") for text in symmetry_problems(self.added_mass)
-        )
+    def problems(self) -> Iterator[Problem]:
+        """Yield what is physically impossible."""
+        yield from super().problems()
+        yield from self.inertia_problems()
+        for text in symmetry_problems(self.added_mass):
+            yield self.problem(text, "added_mass")
         for name in ("added_mass", "linear_damping"):
             for text in eigenvalue_problems(getattr(self, name)):
-                yield self._problem(f"{text}: energy is not generated", name)
+                yield self.problem(f"{text}: energy is not generated", name)
         if (np.diag(self.quadratic_damping) < 0).any():
             diagonal = np.diag(self.quadratic_damping).tolist()
             text = f"found the diagonal {diagonal}, expected numbers of at least 0"
-            yield self._problem(text, "quadratic_damping")
-
-    def _thruster_problems(self) -> Iterator[Problem]:
+            yield self.problem(text, "quadratic_damping")
         if not 1 <= (count := len(self.thrusters)) <= MAX_THRUSTERS:
-            yield self._problem(
+            yield self.problem(
                 f"found {count or 'none'}, expected 1 to {MAX_THRUSTERS}", "thrusters"
             )
-
-    def body(self, boxes: Boxes) -> Body:
-        """Return the rigid body for Bullet, in the principal axes."""
-        return principal_body(self.mass, self.inertia, boxes)
 
 
 #: required keys of the file

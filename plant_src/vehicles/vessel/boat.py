@@ -17,22 +17,20 @@ from typing import Any, TypeVar
 import numpy as np
 
 from cosim.core.component import Variable
-from cosim.core.errors import InputError, Problem
+from cosim.core.errors import Problem
 
 from ...json_reader import JsonPath
 from ..common.interface import matrix_parameter, parameter, vector_parameters
-from ..common.shapes import Body, Boxes, Vector, eigenvalue_problems, symmetry_problems
-from ..common.vehicle_reader import Collision, CollisionBox, VehicleReader
+from ..common.shapes import Vector, eigenvalue_problems, symmetry_problems
+from ..common.vehicle_reader import Collision, CollisionBox, Vehicle, VehicleReader
 from .actuators import MAX_PROPELLERS, MAX_RUDDERS, MIN_TIME_CONSTANT, Propeller, Rudder
 
 
 @dataclass(frozen=True, kw_only=True)
-class Boat:
+class Boat(Vehicle):
     """A rigid body on the water with propellers and rudders.
 
     Attributes:
-        name: Name of the model.
-        mass: Mass (kg).
         centre_of_mass: Centre of mass from O (m).
         added_mass: Added mass M_A, shape (n, n).
         coriolis_added_mass: Part of M_A whose Coriolis loads the damping does not contain, shape
@@ -44,14 +42,9 @@ class Boat:
         propellers: All propellers, at most MAX_PROPELLERS.
         rudders: All rudders, at most MAX_RUDDERS.
         water_density: Density of the water (kg/m3).
-
-    Raises:
-        InputError: For physically impossible values, all together; a problem's subject begins with
-            the name of the attribute.
     """
 
-    name: str
-    mass: float
+    kind = "vessel"
     centre_of_mass: Vector
     added_mass: np.ndarray
     coriolis_added_mass: np.ndarray
@@ -63,15 +56,9 @@ class Boat:
     rudders: Sequence[Rudder]
     water_density: float = 1025.0
 
-    def __post_init__(self) -> None:
-        if problems := list(self.problems()):
-            raise InputError(problems)
-
     def problems(self) -> Iterator[Problem]:
         """Yield what is physically impossible."""
-        if not 0 < self.mass < math.inf:
-            text = f"found {self.mass!r}, expected a finite number greater than 0"
-            yield self.problem(text, "mass")
+        yield from super().problems()
         for name in ("added_mass", "coriolis_added_mass"):
             for text in symmetry_problems(getattr(self, name)):
                 yield self.problem(text, name)
@@ -92,14 +79,6 @@ class Boat:
                     f"{len(self.propellers)}"
                 )
                 yield self.problem(text, "rudders", str(i), "propeller")
-
-    def problem(self, text: str, *subject: str) -> Problem:
-        """Return a problem of an attribute."""
-        return Problem(text, f"vessel {self.name}: {'.'.join(subject)}", subject)
-
-    def body(self, boxes: Boxes) -> Body:
-        """Return the rigid body for Bullet with this collision shape."""
-        raise NotImplementedError
 
     @property
     def slots(self) -> tuple[int, int]:
