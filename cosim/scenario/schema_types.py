@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
@@ -47,17 +48,12 @@ class PlacedError(ValueError):
 
 
 def _parse_time(value: Any) -> Fraction:
-    is_time = (
-        re.fullmatch(_TIME_PATTERN, value)
-        if isinstance(value, str)
-        else isinstance(value, int | float)
-    )
-    if isinstance(value, bool) or not is_time:
-        raise ValueError(_EXPECTED_TIME)
-    try:
-        return exact_fraction(value)
-    except (ValueError, ZeroDivisionError):
-        raise ValueError(_EXPECTED_TIME) from None
+    is_text = isinstance(value, str) and re.fullmatch(_TIME_PATTERN, value)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    with suppress(ValueError, ZeroDivisionError):
+        if is_text or is_number:
+            return exact_fraction(value)
+    raise ValueError(_EXPECTED_TIME)
 
 
 def hint_at_quotes(value: Any, accepts: Callable[[Any], bool]) -> str:
@@ -122,42 +118,27 @@ def _check_gain(value: Any) -> Any:
     return value
 
 
+def _time_schema(pattern: str, **limits: float) -> WithJsonSchema:
+    """Return the JSON Schema of a time: a number within limits, or a text with a pattern."""
+    number = {"type": "number", **limits, "maximum": MAX_TIME}
+    return WithJsonSchema({"anyOf": [number, {"type": "string", "pattern": pattern}]})
+
+
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 Seconds = Annotated[
     Fraction,
     BeforeValidator(_parse_time),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "number", "minimum": -MAX_TIME, "maximum": MAX_TIME},
-                {"type": "string", "pattern": _TIME_PATTERN},
-            ]
-        }
-    ),
+    _time_schema(_TIME_PATTERN, minimum=-MAX_TIME),
 ]
 Period = Annotated[
     Seconds,
     AfterValidator(_check_positive),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "number", "exclusiveMinimum": 0, "maximum": MAX_TIME},
-                {"type": "string", "pattern": _POSITIVE_TIME_PATTERN},
-            ]
-        }
-    ),
+    _time_schema(_POSITIVE_TIME_PATTERN, exclusiveMinimum=0),
 ]
 Duration = Annotated[
     Seconds,
     AfterValidator(_check_not_negative),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "number", "minimum": 0, "maximum": MAX_TIME},
-                {"type": "string", "pattern": rf"^\+?{_UNSIGNED_TIME}"},
-            ]
-        }
-    ),
+    _time_schema(rf"^\+?{_UNSIGNED_TIME}", minimum=0),
 ]
 Gain = Annotated[
     float | list[float],
