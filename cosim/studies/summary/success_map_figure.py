@@ -41,6 +41,7 @@ _FIRST_MARGINS = 1.8, 1.5
 _MAX_LAYOUTS, _SIZE_TOLERANCE = 4, 0.01
 
 
+@figure_style()
 def draw_map(map_: SuccessMap, link: CellLink = lambda _cell: "") -> Figure:
     """Draw a success map as a matplotlib figure.
 
@@ -48,11 +49,6 @@ def draw_map(map_: SuccessMap, link: CellLink = lambda _cell: "") -> Figure:
         map_: the map with its cells.
         link: returns the address that a click on a cell opens in SVG files; empty: none.
     """
-    with figure_style():
-        return _build_figure(map_, link)
-
-
-def _build_figure(map_: SuccessMap, link: CellLink) -> Figure:
     from matplotlib.figure import Figure
 
     layout = MapLayout(map_)
