@@ -193,9 +193,8 @@ def _refuse_connected(prepared: PreparedRun, name: str) -> None:
         return
     sources = {connection.target: connection.source for connection in prepared.system.connections}
     for component, prefix in targets:
-        for slot in (
-            SlotIndex(prepared.system.components[component], "input").below(prefix).values()
-        ):
+        index = SlotIndex(prepared.system.components[component], "input")
+        for slot in index.below(prefix).values():
             if source := sources.get(Endpoint(component, slot)):
                 expected = "expected an input without connection, a parameter or an initial state"
                 raise InputError(f'free: "{component}.{slot}" is fed by "{source}", {expected}')

@@ -66,7 +66,7 @@ def fingerprint_probe() -> Callable[[], str]:
 
 def missing_hashes(files: Mapping[str, str], dask_worker: Any) -> list[str]:
     """Return the content hashes of the files that this worker lacks."""
-    contents = _contents_folder(dask_worker)
+    contents = _worker_folder(dask_worker, "contents")
     return sorted({sha for sha in files.values() if not (contents / sha).is_file()})
 
 
@@ -76,7 +76,7 @@ def store_contents(blobs: Mapping[str, bytes], dask_worker: Any) -> None:
     Raises:
         ValueError: if a content does not match its hash.
     """
-    folder = _contents_folder(dask_worker)
+    folder = _worker_folder(dask_worker, "contents")
     for sha, content in blobs.items():
         if sha256(content).hexdigest() != sha:
             raise ValueError(f"the content {sha} was damaged during the transfer")
@@ -105,16 +105,20 @@ def run_job(
     return {"record": pool.run(job).to_json()}
 
 
-@cache
-def _own_fingerprint() -> str:
-    return cosim_fingerprint()
+_own_fingerprint = cache(cosim_fingerprint)
 
 
 def _worker_pool(package: StudyPackage, worker: Any) -> WorkerPool:
     with _pools_lock:
         study = (package.digest, package.deadline)
         if study not in _worker_pools:
-            root = _link_study_files(package, worker)
+            # links to the stored files, at the paths that the scenario expects
+            root = _worker_folder(worker, "trees") / package.digest
+            for path, sha in package.files.items():
+                file = root / path
+                file.parent.mkdir(parents=True, exist_ok=True)
+                if not file.exists():
+                    os.link(_worker_folder(worker, "contents") / sha, file)
             context = StudyContext(
                 root / package.scenario, root, package.deadline, fmu_paths(package.files)
             )
@@ -122,28 +126,10 @@ def _worker_pool(package: StudyPackage, worker: Any) -> WorkerPool:
         return _worker_pools[study]
 
 
-def _contents_folder(worker: Any) -> Path:
-    return _worker_folder(worker, "contents")
-
-
 def _worker_folder(worker: Any, name: str) -> Path:
     folder = Path(worker.local_directory).resolve() / "cosim" / name
     folder.mkdir(parents=True, exist_ok=True)
     return folder
-
-
-def _link_study_files(package: StudyPackage, worker: Any) -> Path:
-    """Link the stored files of a study into a folder, and return the folder.
-
-    They have the paths that the scenario expects.
-    """
-    root = _worker_folder(worker, "trees") / package.digest
-    for path, sha in package.files.items():
-        file = root / path
-        file.parent.mkdir(parents=True, exist_ok=True)
-        if not file.exists():
-            os.link(_contents_folder(worker) / sha, file)
-    return root
 
 
 #: time limit for the scheduler to answer and to have a worker (s)
@@ -183,7 +169,12 @@ class ClusterRunner:
                 context, if a worker has another cosim.
         """
         require_cluster()
-        _refuse_absolute_paths(study)
+        problems: dict[Problem, None] = {}
+        for settings in study.all_setting_variants:
+            found = absolute_paths(study.study_file.scenario, settings)
+            problems |= dict.fromkeys(study.study_file.locate_problems(found, settings))
+        if problems:
+            raise InputError(problems)
         self._bundle, self._scheduler = study.bundle, scheduler
         files = dict(self._bundle.files)
         deadline = study.spec.deadline
@@ -254,7 +245,9 @@ class ClusterRunner:
             self._send_files(answer["worker"])
         kills[job.key] += bool(answer.get("killed"))
         if kills[job.key] == MAX_ATTEMPTS:
-            yield _killed_answer(job, check)
+            text = f"the worker was killed {MAX_ATTEMPTS} times"
+            record = Record(job.key, failure=text)
+            yield {"problems": [(text, "")]} if check else {"record": record.to_json()}
         elif answer.get("missing") or answer.get("killed"):
             self._submit(job, check, waiting)
         else:
@@ -315,23 +308,6 @@ class ClusterRunner:
         except (OSError, ValueError, KeyError) as error:
             if address in self._client.scheduler_info(n_workers=-1)["workers"]:
                 raise ClusterError(f'files cannot be sent to worker "{address}": {error}') from None
-
-
-def _refuse_absolute_paths(study: Study) -> None:
-    study_file = study.study_file
-    problems: dict[Problem, None] = {}
-    for settings in study.all_setting_variants:
-        found = absolute_paths(study_file.scenario, settings)
-        problems |= dict.fromkeys(study_file.locate_problems(found, settings))
-    if problems:
-        raise InputError(problems)
-
-
-def _killed_answer(job: Job, check: bool) -> dict[str, Any]:
-    text = f"the worker was killed {MAX_ATTEMPTS} times"
-    return (
-        {"problems": [(text, "")]} if check else {"record": Record(job.key, failure=text).to_json()}
-    )
 
 
 def _connect_client(scheduler: str) -> Any:

@@ -62,38 +62,21 @@ def build_factor(spec: FactorSpec, gridded: bool) -> Factor:
     paths = spec.set or []
     if spec.values is not None:
         return _listed_factor(spec.name, [level_of_value(paths, value) for value in spec.values])
+    count = spec.level_count if gridded else 0
     if spec.range is not None:
-        exact, grid_coordinates = _range_quantile(spec.range), _range_coordinates
+        exact = _range_quantile(spec.range)
+        coordinates = [i / (count - 1) for i in range(count)]  # both ends included
     else:
         assert spec.distribution is not None
-        exact, grid_coordinates = _distribution_quantile(spec.distribution), _median_coordinates
-    quantile = _rounded_quantile(exact, spec.integer)
-    coordinates = grid_coordinates(spec.level_count) if gridded else []
+        exact = _distribution_quantile(spec.distribution)
+        coordinates = [(i + 0.5) / count for i in range(count)]  # medians of equally likely parts
+    quantile = (lambda coordinate: round(exact(coordinate))) if spec.integer else exact
     grid = [level_of_value(paths, quantile(coordinate)) for coordinate in coordinates]
     return Factor(spec.name, paths, quantile=quantile, grid_levels=grid)
 
 
 def _listed_factor(name: str, levels: Sequence[Level]) -> Factor:
     return Factor(name, listed_levels=levels, grid_levels=levels)
-
-
-def _range_coordinates(count: int) -> list[float]:
-    """Return coordinates of the grid levels of a range, both ends included."""
-    return [i / (count - 1) for i in range(count)]
-
-
-def _median_coordinates(count: int) -> list[float]:
-    """Return coordinates of the grid levels of a distribution.
-
-    The medians of `count` equally likely parts.
-    """
-    return [(i + 0.5) / count for i in range(count)]
-
-
-def _rounded_quantile(
-    quantile: Callable[[float], float], integer: bool
-) -> Callable[[float], float]:
-    return (lambda coordinate: round(quantile(coordinate))) if integer else quantile
 
 
 def _range_quantile(spec: RangeSpec) -> Callable[[float], float]:

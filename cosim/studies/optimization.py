@@ -59,19 +59,6 @@ def _differential_evolution(evaluate: Evaluator, start: Sequence[float], spec: M
     )
 
 
-def _minimize_locally(evaluate: Evaluator, start: Sequence[float], spec: MethodSpec) -> None:
-    """Search by a method of `scipy.optimize.minimize` that needs no derivatives."""
-    from scipy.optimize import minimize
-
-    minimize(
-        lambda point: evaluate([point.tolist()])[0],
-        start,
-        method=spec.kind.replace("_", "-"),
-        bounds=[(0.0, 1.0)] * len(start),
-        options={"maxfev": spec.evaluations},
-    )
-
-
 def search(
     evaluate: Callable[[Sequence[Mapping[str, float]]], list[float]],
     parameters: Sequence[ParameterSpec],
@@ -88,9 +75,19 @@ def search(
     def evaluate_coordinates(points: Sequence[Sequence[float]]) -> list[float]:
         return evaluate([parameter_values(parameters, point) for point in points])
 
-    is_global = spec.kind == "differential_evolution"
-    method = _differential_evolution if is_global else _minimize_locally
-    method(evaluate_coordinates, _start_coordinates(parameters), spec)
+    start = _start_coordinates(parameters)
+    if spec.kind == "differential_evolution":
+        _differential_evolution(evaluate_coordinates, start, spec)
+        return
+    from scipy.optimize import minimize
+
+    minimize(
+        lambda point: evaluate_coordinates([point.tolist()])[0],
+        start,
+        method=spec.kind.replace("_", "-"),
+        bounds=[(0.0, 1.0)] * len(start),
+        options={"maxfev": spec.evaluations},
+    )
 
 
 def start_values(parameters: Sequence[ParameterSpec]) -> dict[str, float]:

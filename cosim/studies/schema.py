@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from itertools import chain, product
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, StringConstraints, model_validator
+from pydantic import StringConstraints, model_validator
 
 from ..core.errors import did_you_mean
 from ..scenario.evaluation_schema import CheckSpec
-from ..scenario.schema_types import Integer, NameList, PlacedError, Spec, key, schema_of
+from ..scenario.schema_types import Integer, NameList, PlacedError, Spec, key
 from .factor_schema import (
     TRIAL_COLUMNS,
     FactorSpec,
@@ -140,6 +140,14 @@ class StudySpec(Spec):
         return {}
 
 
+#: key of sweeps and of searches for the worst case
+_SUCCESS = key(
+    "limits on KPIs; default: the checks of the scenario",
+    [{"kpi": "landing.lateral_error", "max": 0.2}],
+    default=None,
+)
+
+
 class SweepSpec(StudySpec):
     """A sweep: factors, a design, seeds and criteria of success."""
 
@@ -158,11 +166,7 @@ class SweepSpec(StudySpec):
         {"set": "/components/plant/arguments/environment/seed", "count": 20},
         default=None,
     )
-    success: list[CheckSpec] | None = key(
-        "limits on KPIs; default: the checks of the scenario",
-        [{"kpi": "landing.lateral_error", "max": 0.2}],
-        default=None,
-    )
+    success: list[CheckSpec] | None = _SUCCESS
     by: list[NameList] = key(
         "factors, or lists of factors, by whose levels the runs are grouped in the aggregates",
         ["speed"],
@@ -190,11 +194,21 @@ class SweepSpec(StudySpec):
             if unknown := [name for name in group if name not in columns]:
                 hint = did_you_mean(unknown[0], columns)
                 raise PlacedError(f'"by" names no factor "{unknown[0]}"{hint}', "by", i)
-        for i, each in enumerate(self.maps):
-            _check_map(i, each, self)
+        self._check_maps()
         if self.design.kind == "full_factorial":
             check_level_counts(self.factors)
         return self
+
+    def _check_maps(self) -> None:
+        """Raise PlacedError if a factor of a map does not exist or has no levels."""
+        sampled = self.design.kind != "full_factorial"
+        known = [each.name for each in self.factors if each.has_labels(sampled)]
+        known += ["seed"] if self.seeds else []
+        for i, each in enumerate(self.maps):
+            if unknown := [name for name in each.factors if name not in known]:
+                hint = did_you_mean(unknown[0], known)
+                text = f'"maps" names no factor with levels "{unknown[0]}"{hint}'
+                raise PlacedError(text, "maps", i)
 
     def run_counts(self) -> dict[CountPath, int]:
         """Return the numbers of samples or levels, and of seeds."""
@@ -335,11 +349,7 @@ class WorstCaseSpec(StudySpec):
         ],
         min_length=1,
     )
-    success: list[CheckSpec] | None = key(
-        "limits on KPIs; default: the checks of the scenario",
-        [{"kpi": "landing.lateral_error", "max": 0.2}],
-        default=None,
-    )
+    success: list[CheckSpec] | None = _SUCCESS
     keep: Integer = key(
         "largest number of counterexamples that are written, the worst ones", 5, default=3, ge=1
     )
@@ -383,25 +393,3 @@ def _unique_names(kind: str, entries: Sequence[FactorSpec | ParameterSpec]) -> l
 
 def _first_repeated(names: Sequence[str]) -> str | None:
     return next((name for i, name in enumerate(names) if name in names[:i]), None)
-
-
-def _check_map(index: int, map_: MapSpec, sweep: SweepSpec) -> None:
-    """Raise PlacedError if a factor of a map does not exist or has no levels."""
-    known = [
-        each.name
-        for each in sweep.factors
-        if each.has_labels(sweep.design.kind != "full_factorial")
-    ]
-    known += ["seed"] if sweep.seeds else []
-    for name in map_.factors:
-        if name not in known:
-            raise PlacedError(
-                f'"maps" names no factor with levels "{name}"{did_you_mean(name, known)}',
-                "maps",
-                index,
-            )
-
-
-def study_json_schema(kind: type[BaseModel]) -> dict[str, Any]:
-    """Return the JSON Schema (2020-12) of a sweep or tuning file."""
-    return schema_of(kind)

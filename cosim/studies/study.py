@@ -169,6 +169,8 @@ def run_pending(
 S = TypeVar("S", bound=StudySpec)
 
 _SHIPPED_FOLDER = Path("scenarios") / "sweeps"
+#: keys of a study file whose values contain settings
+_SETTING_KEYS = frozenset(("set", "settings", "levels", "cases"))
 
 
 @dataclass(frozen=True)
@@ -209,56 +211,35 @@ class StudyFile(Generic[S]):
         pointers = {each: _json_path(each) for each in settings if each.startswith("/")}
         locations = (
             self._setting_location(each, settings)
-            for each, start in pointers.items()
-            if _is_within(start, path)
+            for each, below in pointers.items()
+            if below == path or below.startswith((f"{path}.", f"{path}["))
         )
-        below = list(filter(None, locations))
-        return f"{below[0]}, in {where}" if len(below) == 1 else where
+        found = list(filter(None, locations))
+        return f"{found[0]}, in {where}" if len(found) == 1 else where
 
     def _setting_location(self, name: str, settings: Mapping[str, Any], part: str = "") -> str:
         """Return the position of a setting in this file, or of a part of its value.
 
         "" if it is not in this file.
         """
-        paths = [path for path in self._setting_paths() if self._is_setting(path, name, settings)]
-        return (
-            self.document.where(paths[-1]) + (part if paths[-1][-1] == name else "")
-            if paths
-            else ""
-        )
-
-    def _is_setting(
-        self, path: tuple[str | int, ...], name: str, settings: Mapping[str, Any]
-    ) -> bool:
-        """Return whether a path in this file defines a setting.
-
-        It may be a key with its value, or a text of "set".
-        """
-        value = _value_at(self.document.value, path)
-        return value == name or (path[-1] == name and value == settings.get(name))
-
-    def _setting_paths(self) -> Iterable[tuple[str | int, ...]]:
-        """Yield the paths in this file that may define settings, in file order."""
-        for path in sorted(self.document.offsets, key=lambda path: self.document.offsets[path]):
-            if path and (
-                "set" in path or "settings" in path or "levels" in path or "cases" in path
-            ):
-                yield path
+        found: tuple[str | int, ...] = ()
+        for path in sorted(self.document.offsets, key=self.document.offsets.__getitem__):
+            if _SETTING_KEYS.isdisjoint(path):
+                continue
+            value = self.document.value
+            for key in path:
+                value = value[key]
+            # a text of "set", or a key with its value
+            if value == name or (path[-1] == name and value == settings.get(name)):
+                found = path
+        if not found:
+            return ""
+        return self.document.where(found) + (part if found[-1] == name else "")
 
 
 def _json_path(pointer: str) -> str:
     """Return a JSON pointer in the notation of locations, without "$"."""
     return json_path([int(key) if key.isdigit() else key for key in pointer_keys(pointer)])[1:]
-
-
-def _is_within(path: str, start: str) -> bool:
-    return path == start or path.startswith((f"{start}.", f"{start}["))
-
-
-def _value_at(value: Any, path: tuple[str | int, ...]) -> object:
-    for key in path:
-        value = value[key]
-    return value
 
 
 def read_study(
@@ -292,7 +273,11 @@ def read_study(
         raise InputError([*document.problems, *schema_problems(kind, document, error)]) from None
     if document.problems:
         raise InputError(document.problems)
-    _check_counts(spec, document, max_runs)
+    hint = "; --max-runs raises this limit"
+    largest, _ = max(spec.run_counts().items(), key=itemgetter(1))
+    require_at_most(max_runs, spec.max_runs, "runs", document.where(largest), hint)
+    for path, cells in spec.cell_counts().items():
+        require_at_most(max_runs, cells, "cells of the map", document.where(path), hint)
     study_file = StudyFile(spec, document)
     try:
         if not paths.is_file(study_file.scenario):
@@ -333,18 +318,6 @@ def _seed_pointers(study_file: StudyFile[Any]) -> list[str]:
         text = 'the key "set" is missing, and the scenario has no "seeds"'
         raise InputError(Problem(text, study_file.document.where(("seeds",))))
     return seeds
-
-
-def _check_counts(spec: StudySpec, document: Document, max_runs: int) -> None:
-    """Raise InputError if there are more than `max_runs` runs or cells of a map.
-
-    The location is that of the largest factor.
-    """
-    hint = "; --max-runs raises this limit"
-    largest, _ = max(spec.run_counts().items(), key=itemgetter(1))
-    require_at_most(max_runs, spec.max_runs, "runs", document.where(largest), hint)
-    for path, cells in spec.cell_counts().items():
-        require_at_most(max_runs, cells, "cells of the map", document.where(path), hint)
 
 
 def _find_study(file: str | Path) -> Path:

@@ -191,24 +191,21 @@ class Tuning:
             return Trial(parameters, math.nan, math.inf, failures[0])
         operands = [{**record.kpis, **parameters} for record in records]
         values = [self.objective(each) for each in operands]
-        violation = sum(
+        value = float(np.max(values)) if self.spec.over_cases == "max" else fmean(values)
+        violations = (
             constraint.violation(each) for constraint, each in product(self.constraints, operands)
         )
-        return Trial(
-            parameters,
-            float(np.max(values)) if self.spec.over_cases == "max" else fmean(values),
-            violation,
-        )
+        return Trial(parameters, value, sum(violations))
 
     def _check_names(self) -> None:
         """Raise InputError for names that are neither a parameter nor a KPI of any run.
 
         Pass if no run has succeeded.
         """
-        known = {
-            **self.observed_kpis.kpis,
-            **dict.fromkeys(each.name for each in self.spec.parameters),
-        }
+        if not self.observed_kpis.runs:
+            return
+        names = (each.name for each in self.spec.parameters)
+        known = {**self.observed_kpis.kpis, **dict.fromkeys(names)}
         problems = []
 
         def check(expression: Expression, *path: str | int) -> None:
@@ -219,7 +216,7 @@ class Tuning:
         for i, constraint in enumerate(self.constraints):
             check(constraint.left, "constraints", i)
             check(constraint.right, "constraints", i)
-        if problems and self.observed_kpis.runs:
+        if problems:
             raise InputError(problems)
 
 

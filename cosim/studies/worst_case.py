@@ -18,7 +18,7 @@ from ..results.checks import CheckOutcome, evaluate_all_checks, evaluate_checks
 from ..results.files import write_json
 from ..scenario.nested_systems import extending_scenario
 from .execution.bundle import cosim_fingerprint
-from .execution.job import Job, Record
+from .execution.job import Job
 from .execution.run_store import RunStore
 from .optimization import parameter_settings, search, start_values
 from .schema import WorstCaseSpec
@@ -128,12 +128,9 @@ class WorstCase:
 
         def evaluate(values: Sequence[Mapping[str, float]]) -> list[float]:
             run_pending(map(self._job, values), run_store, runner, observe)
-            attempts = [
-                self._attempt(each, run_store[self._job(each).key], run_store.units)
-                for each in values
-            ]
-            self.attempts += attempts
-            return [-each.severity for each in attempts]
+            found = [self._attempt(each, run_store) for each in values]
+            self.attempts += found
+            return [-each.severity for each in found]
 
         search(evaluate, self.spec.parameters, self.spec.method)
         if self.observed_kpis.runs:
@@ -151,9 +148,8 @@ class WorstCase:
     def _job(self, values: Mapping[str, float]) -> Job:
         return self.study.job(parameter_settings(self.spec.parameters, values))
 
-    def _attempt(
-        self, values: Mapping[str, float], record: Record, units: Mapping[str, str]
-    ) -> Attempt:
+    def _attempt(self, values: Mapping[str, float], run_store: RunStore) -> Attempt:
+        record = run_store[self._job(values).key]
         self.observed_kpis.add(record)
         if record.failure:
             return Attempt(values, _FAILED, record.failure, False)
@@ -162,7 +158,7 @@ class WorstCase:
         return Attempt(
             values,
             severity(closest),
-            closest.text(units),
+            closest.text(run_store.units),
             all(outcome.passed for outcome in outcomes),
         )
 

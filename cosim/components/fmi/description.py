@@ -18,7 +18,6 @@ from ...core.component import DTYPES, Causality, Variability, Variable
 from ...core.size_limits import require_at_most
 from ...core.time_grid import exact_fraction
 from ...core.units import BASE_UNITS, Unit, named_unit
-from .preflight import DEFAULT_LIMITS, PreflightLimits
 from .preflight.model_description import (
     Interface,
     ModelDescription,
@@ -27,7 +26,7 @@ from .preflight.model_description import (
     is_true,
     parse_value,
 )
-from .preflight.rules_variables import dimension_size, read_limit
+from .preflight.rules_variables import MAX_ARRAY_SIZE, dimension_size, read_limit
 
 #: types and FMI major versions whose values are C int
 _STORED_AS_C_INT = {("Enumeration", 1), ("Enumeration", 2), ("Boolean", 2)}
@@ -131,16 +130,13 @@ class FmuDescription:
         """FMI major version: 1, 2 or 3."""
         return int(self.fmi_version.split(".")[0])
 
-    def with_structural_parameters(
-        self, values: Mapping[str, int], limits: PreflightLimits = DEFAULT_LIMITS
-    ) -> FmuDescription:
+    def with_structural_parameters(self, values: Mapping[str, int]) -> FmuDescription:
         """Return the description for other values of structural parameters.
 
         They change the shapes of arrays. An array that changes its size loses its start value.
 
         Args:
             values: Positive values of structural parameters by name.
-            limits: Limits of the size of an array.
 
         Raises:
             InputError: An array becomes too large.
@@ -157,7 +153,7 @@ class FmuDescription:
             shape = tuple(sizes[n] if isinstance(n, str) else n for n in dimensions)
             if shape and shape != variable.shape:
                 count, what = math.prod(shape), f'elements of "{variable.name}"'
-                require_at_most(limits.max_array_size, count, what, "")
+                require_at_most(MAX_ARRAY_SIZE, count, what, "")
                 variable = replace(variable, shape=shape, start=None)
             elif variable.name in values:
                 variable = replace(variable, start=values[variable.name])

@@ -55,7 +55,7 @@ class FmuComponent(Component):
         file.check_binary()
         self.name, self._file, self._settings = name, file, settings
         self.description = file.description.with_structural_parameters(
-            settings.structural_parameters, file.limits
+            settings.structural_parameters
         )
         for attribute in _DESCRIBED:
             setattr(self, attribute, getattr(self.description, attribute))

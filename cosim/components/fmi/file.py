@@ -18,11 +18,9 @@ from ...process.journal import current_journal, suspending_deadline
 from ...process.temporary_folders import FMU_PREFIX, LockedFolder
 from .description import FmuDescription, build_description
 from .preflight import (
-    DEFAULT_LIMITS,
     RUN_WARNINGS,
     Examination,
     Interface,
-    PreflightLimits,
     examine,
     extract,
     open_regular_file,
@@ -144,21 +142,15 @@ class FmuFile:
     the content of the file is the same.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        limits: PreflightLimits = DEFAULT_LIMITS,
-        interface: Interface | None = None,
-    ):
+    def __init__(self, path: Path, interface: Interface | None = None):
         """Prepare access to an FMU; the file is not opened yet.
 
         Args:
             path: The FMU.
-            limits: Limits of the preflight check.
             interface: Interface of all instances; by default Co-Simulation if the FMU has it, else
                 Model Exchange.
         """
-        self.path, self.limits, self._interface = path, limits, interface
+        self.path, self._interface = path, interface
         self._folder: LockedFolder | _BorrowedFolder | None = None
         self._extracted: ExtractedFolder | None = None
         self._reference_count = 0
@@ -171,9 +163,7 @@ class FmuFile:
     @cached_property
     def examination(self) -> Examination:
         """Result of the preflight check."""
-        examination: Examination = self._remember(
-            "examination", lambda: examine(self.path, self.limits)
-        )
+        examination: Examination = self._remember("examination", lambda: examine(self.path))
         return examination
 
     @cached_property
@@ -188,7 +178,7 @@ class FmuFile:
         """Return what is read from the file; read it only if its content is new."""
         if not self._key:
             return read()
-        key = (part, self.limits, self._key)
+        key = (part, self._key)
         known = _known_contents.pop(key, None)
         if known is None:
             known = read()
@@ -264,7 +254,7 @@ class FmuFile:
     def read_members(self) -> dict[str, bytes]:
         """Return the contents of all files in the archive by name."""
         with open_regular_file(self.path) as content:
-            archive = Archive(content, self.limits)
+            archive = Archive(content)
             names = [name for name in archive.members if not name.endswith("/")]
             return {name: archive.read(name) for name in names}
 
@@ -299,7 +289,7 @@ class FmuFile:
     def _extract(self) -> ExtractedFolder:
         folder = LockedFolder(FMU_PREFIX)
         try:
-            extract(self.path, self.examination, Path(folder.name), self.limits)
+            extract(self.path, self.examination, Path(folder.name))
             return ExtractedFolder(folder, list_files(folder.name))
         except OSError as error:
             folder.cleanup()
@@ -356,6 +346,6 @@ def open_fmu(
     Raises:
         InputError: The FMU cannot be read, or the copy cannot be made.
     """
-    file = FmuFile(path, interface=interface)
+    file = FmuFile(path, interface)
     copied = None if file.has_binary else add_binary(file)
-    return FmuFile(copied, interface=interface) if copied else file
+    return FmuFile(copied, interface) if copied else file

@@ -353,12 +353,11 @@ def validate_description(description: bytes, source: Path) -> None:
     from fmpy import read_model_description
     from fmpy.model_description import ValidationError
 
-    from ...components.fmi.preflight import DEFAULT_LIMITS
     from ...components.fmi.preflight.findings import FatalFindingError, raise_errors
     from ...components.fmi.preflight.xml import parse_xml
 
     try:
-        parse_xml(description, DESCRIPTION_FILE, DEFAULT_LIMITS)
+        parse_xml(description, DESCRIPTION_FILE)
     except FatalFindingError as error:
         raise_errors(source, [error.finding])
     archive = BytesIO()

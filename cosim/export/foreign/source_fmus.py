@@ -178,7 +178,7 @@ def _read_configurations(file: FmuFile, members: Mapping[str, bytes]) -> list[_C
 def _parse(file: FmuFile, members: Mapping[str, bytes], name: str) -> Any:
     """Return the root element of an XML file, which must be safe to parse."""
     try:
-        return parse_xml(members[name], name, file.limits)
+        return parse_xml(members[name], name)
     except FatalFindingError as error:
         raise InputError(f'"{file.path}": {error.finding}') from None
 

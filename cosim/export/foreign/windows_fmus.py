@@ -111,9 +111,7 @@ def _check_library(file: FmuFile) -> None:
     model = file.examination.model
     assert model is not None  # the description has been built from it
     with open_regular_file(file.path) as content:
-        findings = check_binary(
-            Archive(content, file.limits), model, file.description.interface, WINDOWS, file.limits
-        )
+        findings = check_binary(Archive(content), model, file.description.interface, WINDOWS)
         raise_errors(file.path, list(findings))
 
 

@@ -121,9 +121,12 @@ def read_interface(candidate: CandidateSource) -> CandidateInterface:
         try:
             prepared = load(file, {"/step_size": _common_step(file)})
         except InputError as error:
-            raise InputError(
-                [_with_user_location(problem, file, candidate) for problem in error.problems]
-            ) from None
+            # the user knows no temporary scenario
+            problems = [
+                replace(each, where=candidate.text) if each.where.startswith(str(file)) else each
+                for each in error.problems
+            ]
+            raise InputError(problems) from None
     try:
         root, components = prepared.root, prepared.system.components
         return (
@@ -133,13 +136,6 @@ def read_interface(candidate: CandidateSource) -> CandidateInterface:
         )
     finally:
         prepared.free()
-
-
-def _with_user_location(problem: Problem, file: Path, candidate: CandidateSource) -> Problem:
-    """Replace the position of a problem in the temporary scenario `file` by the user's own text."""
-    return (
-        replace(problem, where=candidate.text) if problem.where.startswith(str(file)) else problem
-    )
 
 
 def _common_step(file: Path) -> str:

@@ -91,11 +91,15 @@ def write_bench_page(
         reference: name of the controller whose cost is 1; "": the costs were not measured.
         reference_cost: its processor time per step (s).
     """
-    scenarios, rows = [], list[KpiRow]()
+    scenarios = []
+    # different meanings of each KPI by its name without an index, as keys of a dict
+    meanings: dict[str, dict[str, None]] = {}
     for name, run in controllers[0].scenarios.items():
-        own_rows = list(_kpi_rows(name, controllers))
-        scenarios.append((name, run.own_name, _settings(name, controllers), own_rows))
-        rows += own_rows
+        rows = list(_kpi_rows(name, controllers))
+        for row in rows:
+            if row.meaning:
+                meanings.setdefault(row.name.partition("[")[0], {})[row.meaning] = None
+        scenarios.append((name, run.own_name, _settings(name, controllers), rows))
     text = render_page(
         "bench.html",
         role=Path(role).stem,
@@ -109,7 +113,7 @@ def write_bench_page(
         different_totals=have_different_totals(controllers),
         columns=[each.name for each in controllers],
         scenarios=scenarios,
-        meanings=_meanings(rows),
+        meanings=meanings,
         version=__version__,
     )
     write_file(path, text)
@@ -162,15 +166,6 @@ def _kpi_rows(scenario: str, controllers: Sequence[BenchedController]) -> Iterat
         yield KpiRow(name, unit, next(filter(None, meanings), ""), limits, cells)
 
 
-def _meanings(rows: Iterable[KpiRow]) -> dict[str, list[str]]:
-    """Return the different meanings of each KPI, by its name without an index."""
-    found: dict[str, dict[str, None]] = {}
-    for row in rows:
-        if row.meaning:
-            found.setdefault(row.name.partition("[")[0], {})[row.meaning] = None
-    return {name: list(meanings) for name, meanings in found.items()}
-
-
 def _cell(name: str, run: RunKpis | None, checks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the text of a KPI in a run (None: it failed), and the limits of failed checks."""
     if run is None or name not in run.kpis:
@@ -215,10 +210,15 @@ def describe_kpis(kpis: Iterable[Mapping[str, Any]], folder: Path) -> dict[str, 
             if definition_problem(spec, folder)
             else ast.get_docstring(function_definition(spec, folder)) or ""
         )
-        for value, meaning in _value_meanings(text).items():
-            found[f"{spec.name}.{value}"] = meaning
+        for names, meaning in _ITEM.findall(text):
+            for value in _NAME.findall(names):
+                found[f"{spec.name}.{value}"] = " ".join(meaning.replace("`", "").split())
         if text:
-            found[spec.name] = _function_meaning(text.partition("\n")[0], spec.arguments)
+            # such as "the mean of the error over time (signal uav.z, start 15.0)"
+            line = text.partition("\n")[0].replace("`", "")
+            line = re.sub(r"^(Return|Evaluate) ", "", line).rstrip(".")
+            settings = ", ".join(f"{name} {value}" for name, value in spec.arguments.items())
+            found[spec.name] = f"{line} ({settings})" if settings else line
     return found
 
 
@@ -226,18 +226,3 @@ def kpi_description(name: str, descriptions: Mapping[str, str]) -> str:
     """Return the meaning of a KPI value such as "waypoints.time[1]"; "" if it is not known."""
     base = name.partition("[")[0]
     return descriptions.get(base) or descriptions.get(base.partition(".")[0], "")
-
-
-def _value_meanings(docstring: str) -> dict[str, str]:
-    meanings: dict[str, str] = {}
-    for names, text in _ITEM.findall(docstring):
-        meaning = " ".join(text.replace("`", "").split())
-        meanings |= dict.fromkeys(_NAME.findall(names), meaning)
-    return meanings
-
-
-def _function_meaning(first_line: str, arguments: Mapping[str, Any]) -> str:
-    """Return a line such as "the mean of the error over time (signal uav.z, start 15.0)"."""
-    line = re.sub(r"^(Return|Evaluate) ", "", first_line.replace("`", "")).rstrip(".")
-    settings = ", ".join(f"{name} {value}" for name, value in arguments.items())
-    return f"{line} ({settings})" if settings else line

@@ -244,18 +244,12 @@ def rank(scenarios: Sequence[ScenarioKpis], goals: Sequence[str]) -> Ranking:
     for each in scenarios:
         ranking.candidate.add(each.candidate, each.checks)
         ranking.shipped.add(each.shipped, each.checks)
-        if each.candidate and each.shipped:
-            _count_goals(ranking, each.candidate, each.shipped, each.checks)
+        if each.candidate is None or each.shipped is None:
+            continue
+        senses = merge_senses(each.candidate.senses, list(each.checks))
+        for name, value in each.candidate.kpis.items():
+            word = compare_values(value, each.shipped.kpis.get(name), senses.get(name))
+            for goal, counts in ranking.goals.items():
+                if word and fnmatchcase(name, goal):
+                    counts[word] += 1
     return ranking
-
-
-def _count_goals(
-    ranking: Ranking, candidate: RunKpis, shipped: RunKpis, checks: Sequence[Mapping[str, Any]]
-) -> None:
-    senses = merge_senses(candidate.senses, list(checks))
-    for goal, counts in ranking.goals.items():
-        for name, value in candidate.kpis.items():
-            if fnmatchcase(name, goal) and (
-                word := compare_values(value, shipped.kpis.get(name), senses.get(name))
-            ):
-                counts[word] += 1

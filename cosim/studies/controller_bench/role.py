@@ -41,7 +41,7 @@ from ...components.fmi import FmuFile
 from ...core import resources
 from ...core.errors import InputError, Problem, did_you_mean
 from ...core.units import Unit, parse_unit
-from ...scenario.json_document import Document, read_document
+from ...scenario.json_document import read_document
 from ...scenario.schema_types import Spec
 
 
@@ -147,35 +147,29 @@ def read_role_file(role: str) -> tuple[Path, RoleSpec]:
 
     The same errors are raised.
     """
-    file = _find_role(role)
-    return file, _validate_role(read_document(file))
+    if role.endswith(".json"):
+        file = Path(role)
+    elif role in role_names():
+        file = resources.root() / "scenarios/roles" / f"{role}.json"
+    else:
+        raise InputError(
+            "there is no role "
+            f'"{role}"{did_you_mean(role, role_names()) or "; valid: " + ", ".join(role_names())}'
+        )
+    document = read_document(file)
+    if document.problems:
+        raise InputError(document.problems)
+    try:
+        return file, RoleSpec.model_validate(document.value)
+    except ValidationError as error:
+        raise InputError(
+            Problem(found["msg"], document.where(found["loc"])) for found in error.errors()
+        ) from None
 
 
 def role_names() -> list[str]:
     """Return the names of the shipped roles."""
     return resources.shipped_names("scenarios/roles/*.json")
-
-
-def _find_role(role: str) -> Path:
-    if role.endswith(".json"):
-        return Path(role)
-    if role not in role_names():
-        raise InputError(
-            "there is no role "
-            f'"{role}"{did_you_mean(role, role_names()) or "; valid: " + ", ".join(role_names())}'
-        )
-    return resources.root() / "scenarios/roles" / f"{role}.json"
-
-
-def _validate_role(document: Document) -> RoleSpec:
-    if document.problems:
-        raise InputError(document.problems)
-    try:
-        return RoleSpec.model_validate(document.value)
-    except ValidationError as error:
-        raise InputError(
-            Problem(found["msg"], document.where(found["loc"])) for found in error.errors()
-        ) from None
 
 
 def _input_units(

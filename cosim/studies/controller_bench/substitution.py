@@ -158,8 +158,11 @@ class ControllerSubstitution:
             parameters = self._known_settings(maps[name], given, f"{name}.")
             own = self.parameters if f"{prefix}{name}" in self.replaced_components else {}
             components[name] = {**components[name], "parameters": {**parameters, **own}}
-            self._note_applied({maps[name](each).own: given[each] for each in given})
-            self._note_applied({(f"{prefix}{name}", each): own[each] for each in own})
+            applied = {maps[name](each).own: setting for each, setting in given.items()}
+            applied |= {(f"{prefix}{name}", each): setting for each, setting in own.items()}
+            for owner, setting in applied.items():
+                if owner:
+                    self.applied_settings.setdefault(owner[0], {})[owner[1]] = setting
         connections = []
         for each in value.get("connections", []):
             if new := self._kept_name(renamed, each["to"]):
@@ -176,7 +179,9 @@ class ControllerSubstitution:
     ) -> dict[str, Any]:
         kind = kind_of(spec).KEY
         source = spec[kind]
-        path = Path(_reference_file(source)).resolve() if isinstance(source, str) else folder
+        path = folder
+        if isinstance(source, str):  # a file, or "my.py:Class"
+            path = Path(source.rpartition(":")[0] or source).resolve()
         if path in self.role.controllers:
             self.replaced_components[full_name] = path.stem
             maps[name] = partial(self._candidate_name, full_name)
@@ -193,11 +198,6 @@ class ControllerSubstitution:
         return {key: value for key, value in spec.items() if key not in (kind, "isolation")} | {
             "system": str(changed)
         }
-
-    def _note_applied(self, settings: Mapping[tuple[str, str] | None, Any]) -> None:
-        for own, value in settings.items():
-            if own:
-                self.applied_settings.setdefault(own[0], {})[own[1]] = value
 
     def _candidate_name(self, component: str, name: str) -> NewName:
         """Return the candidate's name of a variable.
@@ -329,8 +329,3 @@ class ControllerSubstitution:
             return new.name
         self.omissions.append(Omission("", f"{prefix}{name}", new.lacking))
         return None
-
-
-def _reference_file(reference: str) -> str:
-    """Return the file of a reference such as "my.fmu" or "my.py:Class"."""
-    return reference.rpartition(":")[0] or reference

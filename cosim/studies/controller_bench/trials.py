@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -24,7 +23,7 @@ from ..regression import (
 )
 from .candidate import interface_problems, parse_source, read_interface
 from .page import BenchedController, describe_kpis
-from .ranking import KpiComparison, Ranking, RunKpis, ScenarioKpis, compare_kpis, is_current, rank
+from .ranking import KpiComparison, RunKpis, ScenarioKpis, compare_kpis, is_current, rank
 from .role import read_role
 from .step_cost import MeasuredController, measure_step_costs
 from .substitution import ControllerSubstitution, Omission
@@ -38,46 +37,21 @@ class ControllerTrial:
     """Scenario with the candidate and the original scenario.
 
     Attributes:
-        file: the scenario with the candidate.
-        original: the original scenario.
-        own_name: name of the controller of the original scenario.
-        ignored_settings: variables that the scenario sets and the candidate lacks, such as
-            "vtol.landing_time".
-        applied_settings: values that the scenario gives the candidate, by component and the
-            candidate's own variable.
-        kpi_descriptions: meanings of the KPI values (see `describe_kpis`).
+        scenario: what `write_scenarios` has written about it.
         candidate_folder: output directory of the scenario with the candidate.
         shipped_folder: output directory of the original scenario.
         run_command: function that runs commands.
     """
 
-    file: Path
-    original: Path
-    own_name: str
-    ignored_settings: Sequence[str]
-    applied_settings: Mapping[str, Mapping[str, Any]]
-    kpi_descriptions: Mapping[str, str]
+    scenario: Mapping[str, Any]
     candidate_folder: Path
     shipped_folder: Path
     run_command: CommandRunner
 
-    @classmethod
-    def from_json(
-        cls, written: Mapping[str, Any], folder: Path, shipped: Path, run_command: CommandRunner
-    ) -> ControllerTrial:
-        """Return the trial of a scenario that `write_scenarios` has written."""
-        file = Path(written["file"])
-        return cls(
-            file,
-            Path(written["original"]),
-            written["own_name"],
-            written["ignored_settings"],
-            written["applied_settings"],
-            written["kpi_descriptions"],
-            folder / file.stem,
-            shipped / file.stem,
-            run_command,
-        )
+    @property
+    def file(self) -> Path:
+        """The scenario with the candidate."""
+        return Path(self.scenario["file"])
 
     def run(self) -> TrialResult:
         """Run the scenario with the candidate and return the result."""
@@ -88,8 +62,9 @@ class ControllerTrial:
 
     def run_shipped(self) -> None:
         """Run the original scenario unless the results of its last run are up to date."""
-        if not is_current(self.shipped_folder, self.original):
-            Regression(self.original, self.shipped_folder, False, self.run_command).run()
+        original = Path(self.scenario["original"])
+        if not is_current(self.shipped_folder, original):
+            Regression(original, self.shipped_folder, False, self.run_command).run()
 
 
 @dataclass(frozen=True)
@@ -128,13 +103,16 @@ class TrialResult:
             RunKpis.read(self.trial.candidate_folder) if self.outcome.code in (0, 3) else None
         )
         checks = json.loads(self.trial.file.read_text(encoding="utf-8-sig"))["checks"]
-        shipped = RunKpis.read(self.trial.shipped_folder)
-        about = (
-            self.trial.own_name,
-            self.trial.kpi_descriptions,
-            settings_text(self.trial.applied_settings),
+        scenario = self.trial.scenario
+        return ScenarioKpis(
+            candidate,
+            RunKpis.read(self.trial.shipped_folder),
+            checks,
+            self.is_applicable,
+            scenario["own_name"],
+            scenario["kpi_descriptions"],
+            settings_text(scenario["applied_settings"]),
         )
-        return ScenarioKpis(candidate, shipped, checks, self.is_applicable, *about)
 
     def as_json(self) -> dict[str, Any]:
         """Return the result as JSON."""
@@ -144,8 +122,8 @@ class TrialResult:
             "code": self.outcome.code,
             "seconds": self.outcome.seconds,
             "problems": self.outcome.details,
-            "ignored_settings": list(self.trial.ignored_settings),
-            "applied_settings": self.trial.applied_settings,
+            "ignored_settings": self.trial.scenario["ignored_settings"],
+            "applied_settings": self.trial.scenario["applied_settings"],
             "kpis": [asdict(row) | {"checks": row.check_results()} for row in self.rows()],
         }
 
@@ -172,40 +150,38 @@ def summarize_omissions(omissions: Sequence[tuple[str, Omission]]) -> list[str]:
 
     Each entry has the number of its scenarios.
     """
-    settings = [(scenario, each.lacking) for scenario, each in omissions if not each.entry]
-    entries = [
-        (scenario, f'{each.entry} without "{each.lacking}"')
-        for scenario, each in omissions
-        if each.entry
-    ]
+    settings: dict[str, set[str]] = {}
+    entries: dict[str, set[str]] = {}
+    for scenario, each in omissions:
+        if each.entry:
+            entries.setdefault(f'{each.entry} without "{each.lacking}"', set()).add(scenario)
+        else:
+            settings.setdefault(each.lacking, set()).add(scenario)
     headings = {
         "ignored settings, for which the controller has no variable": settings,
         "left out": entries,
     }
-    return [
-        f"{heading} (number of scenarios): {_count_scenarios(items)}"
-        for heading, items in headings.items()
-        if items
-    ]
+    lines = []
+    for heading, scenarios in headings.items():
+        if scenarios:
+            counts = (f"{text} ({len(names)})" for text, names in scenarios.items())
+            lines.append(f"{heading} (number of scenarios): {', '.join(counts)}")
+    return lines
 
 
-def _count_scenarios(items: Iterable[tuple[str, str]]) -> str:
-    """Return each text once, with its number of scenarios, from names of scenarios and texts."""
-    scenarios: dict[str, set[str]] = {}
-    for scenario, text in items:
-        scenarios.setdefault(text, set()).add(scenario)
-    return ", ".join(f"{text} ({len(names)})" for text, names in scenarios.items())
+@dataclass(frozen=True, kw_only=True)
+class ControllerTrials(BenchedController):
+    """Controller with its results in all scenarios, and what is left out of each of them.
 
-
-@dataclass(frozen=True)
-class ControllerTrials:
-    """Results of a controller in all scenarios, what its preparation returned, and its ranking."""
+    Attributes:
+        source: argument of the command, such as "my.fmu".
+        results: the result in each scenario.
+        omissions: names of scenarios, and what is left out of each.
+    """
 
     source: str
-    name: str
-    prepared: Mapping[str, Any]
     results: Sequence[TrialResult]
-    ranking: Ranking
+    omissions: Sequence[tuple[str, Omission]]
 
     @property
     def exit_code(self) -> int:
@@ -213,24 +189,14 @@ class ControllerTrials:
         codes = [result.outcome.code for result in self.results if result.is_applicable]
         return min(codes, key=EXIT_CODE_SEVERITY.index, default=2)
 
-    @property
-    def omissions(self) -> list[tuple[str, Omission]]:
-        """Names of scenarios, and what is left out of each."""
-        found = self.prepared["omissions"]
-        return [
-            (each["scenario"], Omission(each["entry"], each["variable"], each["lacking"]))
-            for each in found
-        ]
-
     def first_finished(self) -> Mapping[str, str] | None:
         """Return the first scenario that the controller ran to its end, with all its inputs fed.
 
         None if there is none.
         """
-        scenarios: Sequence[Mapping[str, str]] = self.prepared["scenarios"]
-        for scenario, result in zip(scenarios, self.results, strict=True):
+        for result in self.results:
             if result.is_applicable and result.outcome.code in (0, 3):
-                return scenario
+                return result.trial.scenario
         return None
 
     def as_json(self) -> dict[str, Any]:
@@ -239,16 +205,6 @@ class ControllerTrials:
         notes = [f"{scenario}: {each}" for scenario, each in self.omissions]
         summary = {**asdict(self.ranking), "verdict": self.ranking.verdict}
         return {"candidate": self.name, "ranking": summary, "scenarios": scenarios, "notes": notes}
-
-    def as_benched(
-        self, cost: float = math.nan, reference_cost: float = math.nan
-    ) -> BenchedController:
-        """Return the controller as the page shows it; costs in s per step."""
-        kpis = {result.name: result.kpis for result in self.results}
-        notes, goals = summarize_omissions(self.omissions), tuple(self.prepared["goals"])
-        return BenchedController(
-            self.name, self.ranking, kpis, goals, notes, cost, cost / reference_cost
-        )
 
 
 def run_trials(
@@ -273,7 +229,8 @@ def run_trials(
     """
     work: list[Callable[[], TrialResult | None]] = []
     for scenario in prepared["scenarios"]:
-        trial = ControllerTrial.from_json(scenario, folder, shipped_folder, run_command)
+        name = Path(scenario["file"]).stem
+        trial = ControllerTrial(scenario, folder / name, shipped_folder / name, run_command)
         work += [trial.run_shipped, trial.run]
     results = []
     for result in run_in_parallel(work, jobs):
@@ -281,8 +238,20 @@ def run_trials(
             results.append(result)
             on_result(result)
     applicable = [result.kpis for result in results if result.is_applicable]
-    ranking = rank(applicable, prepared["goals"])
-    return ControllerTrials(source, parse_source(source).name, prepared, results, ranking)
+    omissions = [
+        (each["scenario"], Omission(each["entry"], each["variable"], each["lacking"]))
+        for each in prepared["omissions"]
+    ]
+    return ControllerTrials(
+        name=parse_source(source).name,
+        ranking=rank(applicable, prepared["goals"]),
+        scenarios={result.name: result.kpis for result in results},
+        goals=prepared["goals"],
+        notes=summarize_omissions(omissions),
+        source=source,
+        results=results,
+        omissions=omissions,
+    )
 
 
 def write_scenarios(

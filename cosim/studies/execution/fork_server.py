@@ -31,7 +31,6 @@ from ...process.limits import detach, thread_count
 from ...process.temporary_folders import temporary_run_folder
 from ...scenario import load_scenario
 from ...scenario.named_functions import find_function_problems, load_function
-from ...scenario.nested_systems import Scenario
 from .job import READY, Job, StudyContext
 from .run import FmuFiles, ReplayRequest, supervised_check, supervised_run
 
@@ -70,32 +69,27 @@ def serve_forks(control: socket.socket) -> None:
 
 
 def _preload(context: StudyContext) -> Iterator[tuple[Path, FmuFile]]:
-    """Import the code that the scenario uses and yield the unpacked FMUs by path.
+    """Import the Python files that the scenario uses and yield the unpacked FMUs by path.
 
     The runs report any problems.
     """
     with suppress(CosimError):
-        _preload_components(load_scenario(context.scenario))
+        # a file that takes longer than its deadline ends this process
+        scenario = load_scenario(context.scenario)
+        spec, root = scenario.spec, scenario.root
+        for node, name in root.leaves():
+            with _ending_after(spec.deadlines.load):
+                node.spec.components[name].preload(node.folder)
+        with _ending_after(spec.deadlines.load):
+            deque(find_function_problems(root, spec, spec, None), maxlen=0)
+            for kpi in spec.kpis:
+                load_function(kpi.python, root.folder)
     for path in context.fmus:
         with suppress(CosimError):
             file = FmuFile(context.root / path)
             if not file.description.once_per_process:
                 file.acquire()
                 yield (context.root / path).resolve(), file
-
-
-def _preload_components(scenario: Scenario) -> None:
-    """Import the Python files of a scenario.
-
-    A file that takes longer than its deadline ends this process.
-    """
-    for node, name in scenario.root.leaves():
-        with _ending_after(scenario.spec.deadlines.load):
-            node.spec.components[name].preload(node.folder)
-    with _ending_after(scenario.spec.deadlines.load):
-        deque(find_function_problems(scenario.root, scenario.spec, scenario.spec, None), maxlen=0)
-        for kpi in scenario.spec.kpis:
-            load_function(kpi.python, scenario.root.folder)
 
 
 @contextmanager
@@ -120,7 +114,12 @@ def _fork_worker(
         control.close()
         detach(fork_server)
         _redirect_output()
-        _serve_requests(socket.socket(fileno=descriptor), context, fmu_files)
+        client = socket.socket(fileno=descriptor)
+        client.sendall(f"{os.getpid()}\n".encode())
+        with client.makefile("rb") as requests:
+            for line in requests:
+                answer = _handle_request(json.loads(line), context, fmu_files)
+                client.sendall(f"{answer}\n".encode())
     finally:
         os._exit(0)
 
@@ -130,13 +129,6 @@ def _redirect_output() -> None:
     with tempfile.TemporaryFile("ab") as file:
         os.dup2(file.fileno(), 1)
         os.dup2(file.fileno(), 2)
-
-
-def _serve_requests(client: socket.socket, context: StudyContext, fmu_files: FmuFiles) -> None:
-    client.sendall(f"{os.getpid()}\n".encode())
-    with client.makefile("rb") as requests:
-        for line in requests:
-            client.sendall((_handle_request(json.loads(line), context, fmu_files) + "\n").encode())
 
 
 def _handle_request(request: dict[str, Any], context: StudyContext, fmu_files: FmuFiles) -> str:

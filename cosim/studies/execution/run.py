@@ -16,7 +16,7 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 
 from ...components.fmi import FmuFile
-from ...core.errors import ComponentError, CosimError, InputError, Problem
+from ...core.errors import CosimError, InputError, Problem
 from ...core.json_values import parse_object
 from ...engine.plan_run import simulating
 from ...process.float_mode import default_float_mode
@@ -74,7 +74,11 @@ def supervised_run(
         )
         record = _make_record(context, job, outcome, reply)
     record = replace(record, seconds=round(time.monotonic() - began, 4))
-    return replace(record, output=_last_output()) if record.failure else record
+    if not record.failure:
+        return record
+    begin = max(0, os.fstat(2).st_size - _MAX_OUTPUT)
+    output = os.pread(2, _MAX_OUTPUT, begin).decode("utf-8", "replace")
+    return replace(record, output=output)
 
 
 def supervised_check(context: StudyContext, job: Job, fmu_files: FmuFiles) -> list[Problem]:
@@ -199,9 +203,11 @@ def _make_record(
     context: StudyContext, job: Job, outcome: SupervisedOutcome, reply: IO[str]
 ) -> Record:
     if outcome.failure:
-        return Record(
-            job.key, failure=_without_root(context, _failure_cause(context, outcome.failure))
-        )
+        cause = str(outcome.failure)
+        # the text for a missed deadline does not name the present call
+        if context.deadline and f"signal {signal.SIGALRM:d} " in outcome.failure.reason:
+            cause = f"the run did not end within {context.deadline:g} s"
+        return Record(job.key, failure=_without_root(context, cause))
     reply.seek(0)
     try:
         answer = parse_object(reply.read())
@@ -211,21 +217,6 @@ def _make_record(
     return replace(record, failure=_without_root(context, record.failure))
 
 
-def _failure_cause(context: StudyContext, failure: ComponentError) -> str:
-    """Return the cause of a failure.
-
-    The text for a missed deadline does not name the present call.
-    """
-    if context.deadline and f"signal {signal.SIGALRM:d} " in failure.reason:
-        return f"the run did not end within {context.deadline:g} s"
-    return str(failure)
-
-
 def _without_root(context: StudyContext, text: str) -> str:
     """Return a text with paths relative to the study's root, so that all machines give the same."""
     return text.replace(f"{context.root}/", "")
-
-
-def _last_output() -> str:
-    size = os.fstat(2).st_size
-    return os.pread(2, _MAX_OUTPUT, max(0, size - _MAX_OUTPUT)).decode("utf-8", "replace")

@@ -91,17 +91,15 @@ class RunStore:
                     os.ftruncate(self._file, size)
                     break
                 if record:
-                    self._index(record, size, retry)
+                    key = bytes.fromhex(record.key)
+                    if retry and record.failure:
+                        self._positions.pop(key, None)
+                    else:
+                        self._positions[key] = size
                     self.units |= record.units
                 self.unreadable_lines += record is None
                 size += len(line)
         return size
-
-    def _index(self, record: Record, position: int, retry: bool) -> None:
-        if retry and record.failure:
-            self._positions.pop(bytes.fromhex(record.key), None)
-        else:
-            self._positions[bytes.fromhex(record.key)] = position
 
     def claim_jobs(self, jobs: Iterable[Job]) -> Iterator[Job]:
         """Yield the jobs that are not finished, each key only once."""

@@ -63,6 +63,10 @@ def write_sweep_page(
     remove_files(folder, *found)
     statistics = overall.shown_statistics() if overall else ()
     cells = list(_shown_cells(sweep, rows, summary.units, maps, folder))
+    criteria = []
+    for check in sweep.criteria:
+        (outcome,) = evaluate_checks({check["kpi"]: 0.0}, [check])
+        criteria.append((check["kpi"], criterion_limits(outcome, summary.units)))
     text = render_page(
         "sweep.html",
         spec=sweep.study_file.spec,
@@ -70,7 +74,7 @@ def write_sweep_page(
         summary=summary,
         overall=overall,
         design=list(_design_rows(sweep)),
-        criteria=[_criterion(check, summary.units) for check in sweep.criteria],
+        criteria=criteria,
         maps=[_write_map(sweep, each, folder) for each in maps],
         commands=[cell for cell in cells if cell["link"].startswith(PAGE_FILE)],
         replays=[cell for cell in cells if not cell["link"].startswith(PAGE_FILE)],
@@ -79,12 +83,6 @@ def write_sweep_page(
         file=sweep.study_file.document.file,
     )
     write_file(folder / PAGE_FILE, text)
-
-
-def _criterion(check: Mapping[str, Any], units: Mapping[str, str]) -> tuple[str, str]:
-    """Return a criterion as (KPI, limits with their unit)."""
-    (outcome,) = evaluate_checks({check["kpi"]: 0.0}, [check])
-    return check["kpi"], criterion_limits(outcome, units)
 
 
 def _design_rows(sweep: Sweep) -> Iterator[tuple[str, str]]:

@@ -10,7 +10,6 @@ from functools import cached_property
 from itertools import product
 from typing import Any, NamedTuple
 
-from ..design import Design
 from ..schema import MapSpec
 from ..sweep import Sweep, SweepRow
 from .statistics import ConfidenceInterval, wilson_interval
@@ -108,15 +107,21 @@ def success_maps(sweep: Sweep, rows: Iterable[SweepRow]) -> list[SuccessMap]:
         run = MapRun(
             row.run, row.passed, float(row.record.kpis.get(kpi, math.nan)), sweep.keys[row.run]
         )
-        for spec, cells in zip(specs, cells_of_maps, strict=True):
-            cells.setdefault(
+        for spec, runs in zip(specs, cells_of_maps, strict=True):
+            runs.setdefault(
                 _labels_key(row.point.labels[name] for name in spec.factors), []
             ).append(run)
-    names = [MAP_NAME if len(specs) == 1 else f"{MAP_NAME}_{i + 1}" for i in range(len(specs))]
-    return [
-        _build_map(*each, sweep.design, kpi)
-        for each in zip(names, specs, cells_of_maps, strict=True)
-    ]
+    maps = []
+    for number, (spec, found) in enumerate(zip(specs, cells_of_maps, strict=True), 1):
+        levels = {factor: sweep.design.labels(factor) for factor in spec.factors}
+        cells = {}
+        for labels in product(*levels.values()):
+            text = _labels_key(labels)
+            named = dict(zip(levels, labels, strict=True))
+            cells[text] = MapCell(named, found.get(text, ()), kpi)
+        name = MAP_NAME if len(specs) == 1 else f"{MAP_NAME}_{number}"
+        maps.append(SuccessMap(name, spec, levels, cells))
+    return maps
 
 
 def ranking_kpi(criteria: Iterable[Mapping[str, Any]]) -> str:
@@ -126,16 +131,3 @@ def ranking_kpi(criteria: Iterable[Mapping[str, Any]]) -> str:
 
 def _labels_key(labels: Iterable[Any]) -> str:
     return json.dumps(list(labels))
-
-
-def _build_map(
-    name: str, spec: MapSpec, runs: Mapping[str, Sequence[MapRun]], design: Design, kpi: str
-) -> SuccessMap:
-    levels = {factor: design.labels(factor) for factor in spec.factors}
-    cells = {
-        _labels_key(labels): MapCell(
-            dict(zip(levels, labels, strict=True)), runs.get(_labels_key(labels), ()), kpi
-        )
-        for labels in product(*levels.values())
-    }
-    return SuccessMap(name, spec, levels, cells)

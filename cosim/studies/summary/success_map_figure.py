@@ -41,6 +41,7 @@ _FIRST_MARGINS = 1.8, 1.5
 _MAX_LAYOUTS, _SIZE_TOLERANCE = 4, 0.01
 
 
+@figure_style()
 def draw_map(map_: SuccessMap, link: CellLink = lambda _cell: "") -> Figure:
     """Draw a success map as a matplotlib figure.
 
@@ -48,19 +49,13 @@ def draw_map(map_: SuccessMap, link: CellLink = lambda _cell: "") -> Figure:
         map_: the map with its cells.
         link: returns the address that a click on a cell opens in SVG files; empty: none.
     """
-    with figure_style():
-        return _build_figure(map_, link)
-
-
-def _build_figure(map_: SuccessMap, link: CellLink) -> Figure:
     from matplotlib.figure import Figure
 
     layout = MapLayout(map_)
-    rows, columns, _, _ = layout.levels
-    size = [
-        panels + margin for panels, margin in zip(layout.panels_size, _FIRST_MARGINS, strict=True)
-    ]
-    figure = Figure(figsize=(size[0], size[1]), layout="constrained")
+    rows, columns, ys, xs = layout.levels
+    (width, height), (width_margin, height_margin) = layout.panels_size, _FIRST_MARGINS
+    size = (width + width_margin, height + height_margin)
+    figure = Figure(figsize=size, layout="constrained")
     cast(Any, figure.get_layout_engine()).set(w_pad=GAP / 2, h_pad=GAP / 2, wspace=0, hspace=0)
     grid = figure.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
     for axes in grid.flat:
@@ -71,14 +66,10 @@ def _build_figure(map_: SuccessMap, link: CellLink) -> Figure:
     x_title.set_x((grid[0, 0].get_position().x0 + grid[0, -1].get_position().x1) / 2)
     # cells do not change the layout, and each layout draws everything
     for (i, row), (j, column) in product(enumerate(rows), enumerate(columns)):
-        _draw_cells(grid[i][j], layout, row, column, link)
+        for (y, y_label), (x, x_label) in product(enumerate(ys), enumerate(xs)):
+            cell = map_.cell(row, column, y_label, x_label)
+            _draw_cell(grid[i][j], x, y, cell, layout.cell, link)
     return figure
-
-
-def _draw_cells(axes: Axes, layout: MapLayout, row: Any, column: Any, link: CellLink) -> None:
-    _, _, ys, xs = layout.levels
-    for (j, y), (i, x) in product(enumerate(ys), enumerate(xs)):
-        _draw_cell(axes, i, j, layout.map_.cell(row, column, y, x), layout.cell, link)
 
 
 def _prepare_panel(axes: Axes, layout: MapLayout) -> None:
@@ -116,29 +107,19 @@ def _draw_cell(
         return
     ink = "black" if cell.success_rate > 0.5 else "white"
     roomy = size[0] >= _MIN_CELL_FOR_INTERVAL[0] and size[1] >= _MIN_CELL_FOR_INTERVAL[1]
-    ratio = (
-        min(
-            size[0] / _MIN_CELL_FOR_INTERVAL[0],
-            size[1] / _MIN_CELL_FOR_INTERVAL[1],
-            _MAX_FONT_RATIO,
-        )
-        if roomy
-        else 1.0
-    )
+    ratio = 1.0
+    if roomy:
+        width, height = _MIN_CELL_FOR_INTERVAL
+        ratio = min(size[0] / width, size[1] / height, _MAX_FONT_RATIO)
     style: dict[str, Any] = {"ha": "center", "va": "center", "color": ink}
-    axes.text(
-        x, y + 0.24 * roomy, _percent(cell.success_rate), fontsize=ratio * _RATE_FONT_SIZE, **style
-    )
+    rate = f"{100 * cell.success_rate:.0f} %"
+    axes.text(x, y + 0.24 * roomy, rate, fontsize=ratio * _RATE_FONT_SIZE, **style)
     if roomy:
         low, high = cell.interval
         detail = f"{cell.passed}/{len(cell.runs)}\n{100 * low:.0f}–{100 * high:.0f} %"
         axes.text(
             x, y - 0.2, detail, fontsize=ratio * _INTERVAL_FONT_SIZE, linespacing=1.15, **style
         )
-
-
-def _percent(share: float) -> str:
-    return "" if math.isnan(share) else f"{100 * share:.0f} %"
 
 
 def _annotate(figure: Figure, grid: Any, layout: MapLayout) -> Text:
@@ -248,15 +229,12 @@ class MapLayout:
     @cached_property
     def titles(self) -> tuple[str, str]:
         """Titles of the axes x and y."""
-        lengths = (
-            size + excess for size, excess in zip(self.panels_size, _TITLE_EXCESS, strict=True)
+        (width, height), (x_excess, y_excess) = self.panels_size, _TITLE_EXCESS
+        x, y = self.map_.title(self.map_.spec.x), self.map_.title(self.map_.spec.y)
+        return (
+            _wrap(x, width + x_excess, AXIS_FONT_SIZE),
+            _wrap(y, height + y_excess, AXIS_FONT_SIZE),
         )
-        factors = (self.map_.spec.x, self.map_.spec.y)
-        x, y = (
-            _wrap(self.map_.title(factor), length, AXIS_FONT_SIZE)
-            for factor, length in zip(factors, lengths, strict=True)
-        )
-        return x, y
 
     @cached_property
     def column_titles(self) -> list[str]:

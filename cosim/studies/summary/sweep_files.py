@@ -84,20 +84,18 @@ def write_sweep_files(
         write_parquet(rows, factors, kpis, folder / "table.parquet")
     else:
         remove_files(folder, "table.parquet")
-    groups, statistics = [], []
+    groups, statistics, success = [], list[list[Any]](), list[list[Any]]()
     for names in groupings(sweep.design, sweep.study_file.spec.by):
         for group in group_rows(rows, names):
-            statistics += [
-                _statistics_row(group, factors, kpi, numbers) for kpi, numbers in group.statistics()
-            ]
+            labels = [group.labels.get(name) for name in factors]
+            for kpi, numbers in group.statistics():
+                statistics.append([*labels, kpi, *numbers.values()])
+            counts = (group.runs, group.distinct, group.failed, group.passed)
+            success.append([*labels, *counts, group.success_rate, *group.interval])
             group.kpis = group.kpis if not names else {}
             groups.append(group)
     write_csv_rows([*factors, *AGGREGATE_COLUMNS], statistics, folder / "aggregates.csv")
-    write_csv_rows(
-        [*factors, *SUCCESS_COLUMNS],
-        (_success_row(group, factors) for group in groups),
-        folder / "success.csv",
-    )
+    write_csv_rows([*factors, *SUCCESS_COLUMNS], success, folder / "success.csv")
     units = run_store.units
     unsuccessful = (
         [each.run, *each.labels.values(), "; ".join(each.missed), each.command]
@@ -119,57 +117,29 @@ def write_sweep_files(
         missed_criteria(sweep, rows(), units),
         list(islice(unsuccessful_runs(sweep, rows(), units), _MAX_LISTED_RUNS)),
     )
-    write_json(_sweep_metadata(sweep, summary), folder / "sweep.json")
+    spec, document = sweep.study_file.spec, sweep.study_file.document
+    metadata = {
+        "name": spec.name,
+        "sweep": document.value,
+        "sweep_file": str(document.file.resolve()),
+        "scenario_file": str(sweep.study_file.scenario.resolve()),
+        "cosim": cosim_fingerprint(),
+        "sha256": dict(sweep.study.bundle.files),
+        "success": sweep.criteria,
+        "units": dict(units),
+        "runs": len(sweep),
+        "finished": summary.finished,
+        "failed": summary.failed,
+        "passed": groups[0].passed if groups else 0,
+    }
+    write_json(metadata, folder / "sweep.json")
     return summary
-
-
-def _statistics_row(
-    group: RunGroup, factors: list[str], kpi: str, numbers: dict[str, float]
-) -> list[Any]:
-    return [*(group.labels.get(name) for name in factors), kpi, *numbers.values()]
-
-
-def _success_row(group: RunGroup, factors: list[str]) -> list[Any]:
-    labels = (group.labels.get(name) for name in factors)
-    return [
-        *labels,
-        group.runs,
-        group.distinct,
-        group.failed,
-        group.passed,
-        group.success_rate,
-        *group.interval,
-    ]
 
 
 def _failure_rows(sweep: Sweep, rows: Iterator[SweepRow]) -> Iterator[list[Any]]:
     for row in rows:
         if row.record.failure:
-            command = format_run_command(
-                sweep.study_file.scenario, sweep.study.job(row.point.settings).settings
-            )
-            yield [
-                row.run,
-                *row.point.labels.values(),
-                row.record.failure,
-                row.record.output,
-                command,
-            ]
-
-
-def _sweep_metadata(sweep: Sweep, summary: SweepSummary) -> dict[str, Any]:
-    spec = sweep.study_file.spec
-    return {
-        "name": spec.name,
-        "sweep": sweep.study_file.document.value,
-        "sweep_file": str(sweep.study_file.document.file.resolve()),
-        "scenario_file": str(sweep.study_file.scenario.resolve()),
-        "cosim": cosim_fingerprint(),
-        "sha256": dict(sweep.study.bundle.files),
-        "success": sweep.criteria,
-        "units": dict(summary.units),
-        "runs": len(sweep),
-        "finished": summary.finished,
-        "failed": summary.failed,
-        "passed": summary.groups[0].passed if summary.groups else 0,
-    }
+            settings = sweep.study.job(row.point.settings).settings
+            command = format_run_command(sweep.study_file.scenario, settings)
+            labels, record = row.point.labels.values(), row.record
+            yield [row.run, *labels, record.failure, record.output, command]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -99,17 +99,12 @@ def write_parquet(rows: RowSource, factors: Sequence[str], kpis: Sequence[str], 
     with writing_atomically(path) as temporary, ParquetWriter(temporary, schema) as writer:
         lines = (row_values(row, factors, kpis) for row in rows())
         while batch := list(islice(lines, _BATCH_SIZE)):
-            writer.write_batch(pa.record_batch(list(_arrow_columns(batch, schema)), schema=schema))
-
-
-def _arrow_columns(batch: list[list[Any]], schema: Any) -> Iterator[Any]:
-    import pyarrow as pa
-
-    for field, column in zip(schema, zip(*batch, strict=True), strict=True):
-        if field.type == pa.string():
-            yield pa.array([str(csv_value(value)) for value in column], field.type)
-        elif field.type == pa.float64():
-            numbers = [None if value is None else float(value) for value in column]
-            yield pa.array(numbers, field.type)
-        else:
-            yield pa.array(column, field.type)
+            columns = []
+            for field, values in zip(schema, zip(*batch, strict=True), strict=True):
+                column: Sequence[Any] = values
+                if field.type == pa.string():
+                    column = [str(csv_value(value)) for value in values]
+                elif field.type == pa.float64():
+                    column = [None if value is None else float(value) for value in values]
+                columns.append(pa.array(column, field.type))
+            writer.write_batch(pa.record_batch(columns, schema=schema))

@@ -142,32 +142,20 @@ class FreeContactMaps:
 
 
 @dataclass(frozen=True)
-class SubmergedContactMaps:
+class SubmergedContactMaps(FreeContactMaps):
     """Contact functions of a free rigid body in water.
 
-    The argument `contact_impulse` is the impulse in the last step (N s, N m s about the centre of
-    mass, world frame).
+    The environment inputs of the model are the current (x, y) and the water level. The argument
+    `contact_impulse` is the impulse in the last step (N s, N m s about the centre of mass, world
+    frame).
 
     Attributes:
-        model: Equations of the vehicle as they are exported; its environment inputs are the current
-            (x, y) and the water level.
-        rigid_body: Function from the constants to mass and inertia.
         velocity_change: Function from the upward axis of the world (body frame), the depth of the
             centre of mass (m), the constants and an impulse (6, body frame) to the change of
             velocity and rates (6, body frame), with the added mass.
     """
 
-    model: ContinuousModel
-    rigid_body: Callable[[ca.SX], RigidBody]
     velocity_change: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX]
-
-    def functions(self) -> list[ca.Function]:
-        """Return the functions to export."""
-        return [
-            free_initialize_function(self.model),
-            self._predict_function(),
-            self._correct_function(),
-        ]
 
     def _predict_function(self) -> ca.Function:
         arguments = predict_symbols(self.model) | create_symbols(

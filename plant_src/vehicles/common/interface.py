@@ -86,17 +86,26 @@ def parameter(
     )
 
 
-def vector_parameters(
-    name: str,
-    unit: str,
-    values: Sequence[float],
-    description: str,
-    minimum: float | None = None,
+def attribute_parameters(
+    data: object, rows: Iterable[tuple[str, str, str, float | None, str]]
 ) -> Iterator[Variable]:
-    """Yield a parameter for each component of a vector along x, y and z of the body."""
-    for axis, value in zip("xyz", values, strict=False):
-        text = f"{description}: {axis}, body frame"
-        yield parameter(f"{name}.{axis}", unit, float(value), text, minimum)
+    """Yield a parameter for each of some attributes of vehicle data.
+
+    An attribute is a number, or a vector along x, y and z of the body with a parameter for each
+    component.
+
+    Args:
+        data: Vehicle data.
+        rows: Attribute, and name, unit, smallest value and description of its parameter.
+    """
+    for attribute, name, unit, minimum, text in rows:
+        value = getattr(data, attribute)
+        if np.ndim(value):
+            for axis, component in zip("xyz", value, strict=False):
+                description = f"{text}: {axis}, body frame"
+                yield parameter(f"{name}.{axis}", unit, float(component), description, minimum)
+        else:
+            yield parameter(name, unit, value, text, minimum)
 
 
 def matrix_parameter(name: str, description: str, matrix: np.ndarray) -> Variable:

@@ -376,14 +376,6 @@ class CollisionBox:
 Collision = CollisionBox | ConvexPiece
 
 
-def boxes_in(boxes: Sequence[Collision], to_body: np.ndarray) -> tuple[Shape, ...]:
-    """Return the collision shape in another frame.
-
-    `to_body` (3, 3) rotates from this frame into the body frame.
-    """
-    return tuple(box.shape_in(to_body) for box in boxes)
-
-
 def edges_around(boxes: Sequence[Collision]) -> Vector:
     """Return the edges (m) of the box around all boxes; 1 m if there are none."""
     unit_box = CollisionBox((1.0,) * 3, (0.0,) * 3, 0.0)
@@ -406,7 +398,7 @@ class VehicleData(Generic[_Vehicle]):
         Raises InputError if these are impossible.
         """
         vehicle = replace(self.vehicle, **changes)
-        return vehicle.body(lambda to_body: boxes_in(self.boxes, to_body))
+        return vehicle.body(lambda to_body: tuple(box.shape_in(to_body) for box in self.boxes))
 
 
 class VehicleReader(QuantityReader, Generic[_Vehicle]):

@@ -36,7 +36,7 @@ a rotor have the coefficients 0.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import chain
 from typing import NamedTuple
@@ -47,14 +47,14 @@ import numpy as np
 from cosim.core.component import Variable
 from cosim.export.equations.c_code import Callee
 from cosim.export.equations.fmu_code import as_block
-from cosim.export.equations.model import ContinuousModel, runge_kutta_4
+from cosim.export.equations.model import runge_kutta_4
 from cosim.export.fmu.block import Block
 
 from ..common.contact_maps import FreeContactMaps, create_symbols
-from ..common.interface import WORLD_OUTPUTS
 from ..common.named_values import ConstantsMap, NamedValues, values_by_name, variables_of
 from ..common.rigid_body import (
     RIGID_BODY_STATE_COUNT,
+    SteppedModel,
     initial_rigid_state,
     lagging_speeds,
     motion_of_state,
@@ -62,6 +62,7 @@ from ..common.rigid_body import (
     rigid_body,
     rigid_body_rate,
     symmetric_matrix,
+    with_world_outputs,
 )
 from ..common.water_surface import SURFACE_SUM
 from .airframe import MAX_ROTORS, Airframe, Rotor, RotorEffects
@@ -264,21 +265,6 @@ def _spinning_rotors(speed: ca.SX, target: ca.SX, constants: NamedValues) -> Spi
     return SpinningRotors(speed, constants["momenta"] @ speed, constants["momenta"] @ rate)
 
 
-@dataclass(frozen=True)
-class Multirotor(ContinuousModel):
-    """A multirotor in free flight that is integrated by the compiled function `free_step`."""
-
-    free_step: ca.Function = field(kw_only=True)
-
-    def integrate(
-        self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1
-    ) -> ca.SX:
-        """Return the state after `step` (s) with held inputs, in equal sub-steps."""
-        for _ in range(sub_steps):
-            state = self.free_step(state, inputs, parameters, step / sub_steps)
-        return state
-
-
 def free_step(equations: MultirotorEquations) -> Callee:
     """Return the function of one step.
 
@@ -351,19 +337,17 @@ def multirotor_block(airframe: Airframe, description: str, rotor_slots: int | No
     equations = MultirotorEquations(airframe, rotor_slots or len(airframe.rotors))
     step, functions = free_step(equations), equations.rotor_functions
     surroundings, surroundings_callee = create_surroundings_function()
-    model = Multirotor(
+    model = SteppedModel(
         airframe.name,
         description,
         equations.variables,
         states(equations.slots),
         equations.initial_state,
         equations.rate,
-        lambda state, _inputs, _constants: ca.vertcat(
-            motion_of_state(state), ca.SX.zeros(len(WORLD_OUTPUTS))
-        ),
+        lambda state, _inputs, _constants: with_world_outputs(motion_of_state(state)),
         derived_parameters=equations.constants.vector,
         callees=[step, *functions.callees, surroundings_callee, SURFACE_SUM],
-        free_step=step.function,
+        step=step.function,
     )
     maps = FreeContactMaps(model, lambda c: rigid_body(equations.constants.by_name(c)))
     return as_block(model, [*maps.functions(), surroundings])

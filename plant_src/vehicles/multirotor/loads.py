@@ -94,21 +94,6 @@ def still_air_loads(table: ca.SX, slots: int) -> ca.SX:
     return ca.horzcat(*loads)
 
 
-def create_still_air_load(slots: int) -> Callee:
-    """Create the function of all rotors' load in still air far from a surface.
-
-    Args:
-        slots: Number of elements of the arrays of rotors.
-
-    Returns:
-        Function of the matrix of `still_air_loads`, the number of rotors and the speeds (rad/s).
-        Its result has the shape (6,).
-    """
-    matrix, speed = ca.SX.sym("matrix", 6, slots), ca.SX.sym("speed", slots)
-    arguments = matrix, ca.SX.sym("count"), speed
-    return Callee(ca.Function("still_air_load", arguments, [matrix @ speed**2]), _STILL_AIR_LOAD_C)
-
-
 _STILL_AIR_LOAD_C = """{
     for (int j = 0; j < 6; ++j) out[0][j] = 0;
     for (int i = 0; i < in[1][0]; ++i) {
@@ -164,8 +149,16 @@ class RotorFunctions:
 
     @cached_property
     def still_air_load(self) -> Callee:
-        """Sum of the loads of all rotors in still air."""
-        return create_still_air_load(self.slots)
+        """Sum of the loads of all rotors in still air far from a surface, shape (6,).
+
+        Its arguments are the matrix of `still_air_loads`, the number of rotors and the speeds
+        (rad/s).
+        """
+        matrix, speed = ca.SX.sym("matrix", 6, self.slots), ca.SX.sym("speed", self.slots)
+        function = ca.Function(
+            "still_air_load", [matrix, ca.SX.sym("count"), speed], [matrix @ speed**2]
+        )
+        return Callee(function, _STILL_AIR_LOAD_C)
 
     @cached_property
     def load_sum(self) -> Callee:

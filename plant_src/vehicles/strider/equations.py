@@ -19,8 +19,9 @@ from cosim.export.equations.model import ContinuousModel
 from cosim.export.fmu.block import Block
 
 from ..common.elementary_functions import logarithm, sine_and_cosine
-from ..common.interface import PLANAR_STATES, WORLD_OUTPUTS
+from ..common.interface import PLANAR_STATES
 from ..common.named_values import ConstantsMap, NamedValues, initial_parameters, values_by_name
+from ..common.rigid_body import with_world_outputs
 from ..vessel import planar_maps
 from ..vessel.propulsion import rudder_force
 from . import parameters as p
@@ -163,9 +164,7 @@ def model() -> ContinuousModel:
         lambda state, inputs, constants: rate(
             state, values_by_name(inputs, INPUTS), CONSTANTS.by_name(constants)
         ),
-        lambda state, _inputs, _constants: ca.vertcat(
-            observe(state), ca.SX.zeros(len(WORLD_OUTPUTS))
-        ),
+        lambda state, _inputs, _constants: with_world_outputs(observe(state)),
         derived_parameters=CONSTANTS.vector,
     )
 

@@ -70,9 +70,14 @@ class HullForm:
         return self.beam / (3 - self.count)
 
     @property
-    def drag_point(self) -> tuple[float, float]:
-        """Distances ahead and to port of the four points at which the bottom drag acts (m)."""
-        return self.length / 12**0.5, self.offset if self.count == 2 else self.beam / 12**0.5
+    def drag_point_ahead(self) -> float:
+        """Distance ahead of the four points at which the bottom drag acts (m)."""
+        return self.length / 12**0.5
+
+    @property
+    def drag_point_abeam(self) -> float:
+        """Distance of these points to port (m)."""
+        return self.offset if self.count == 2 else self.beam / 12**0.5
 
 
 @dataclass(frozen=True, kw_only=True)

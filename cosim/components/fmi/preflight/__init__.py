@@ -5,73 +5,47 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from io import BufferedReader
-from itertools import islice
+from itertools import islice, starmap
 from pathlib import Path
 
 from ....core.errors import InputError
 from . import rules_model, rules_variables
-from .archive import NAME_FORM, REPEATED, Archive, open_regular_file
+from .archive import Archive, open_regular_file
 from .binary import check_binary
 from .findings import (
-    DEFAULT_LIMITS,
     DESCRIPTION_FILE,
+    RUN_WARNINGS,
     FatalFindingError,
     Finding,
-    PreflightLimits,
-    Rule,
     raise_errors,
 )
-from .model_description import Interface, ModelDescription
+from .model_description import Interface, ModelDescription, Violation, to_finding
 from .platforms import current_platform
 from .xml import parse_xml
 from .xml_reader import check_repeated_elements, read_model
 
 __all__ = [
-    "DEFAULT_LIMITS",
     "DESCRIPTION_FILE",
     "RUN_WARNINGS",
     "Examination",
     "Finding",
     "Interface",
-    "PreflightLimits",
     "examine",
     "extract",
     "open_regular_file",
     "raise_errors",
 ]
 
-MISSING = Rule("archive.description", "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5")
-CHANGED = Rule("archive.changed", "limits")
-#: rules whose violations do not prevent a run, but may change its results
-RUN_WARNINGS = frozenset(
-    {
-        *(NAME_FORM, REPEATED, rules_model.OUTPUTS),
-        *(rules_model.EMPTY_TOKEN, rules_model.IDENTIFIER, rules_model.EXPERIMENT_VALUE),
-        *(
-            rules_variables.UNIQUE,
-            rules_variables.UNIT,
-            rules_variables.COMBINATION,
-            rules_variables.CONTINUOUS,
-            rules_variables.INITIAL_RULE,
-        ),
-        *(
-            rules_variables.DECLARED,
-            rules_variables.MISSING,
-            rules_variables.RANGE,
-            rules_variables.LIMIT,
-        ),
-    }
-)
 _MAX_FINDINGS_PER_CHECK = 100
 #: folders that a running FMU does not use
 _UNUSED_FOLDERS = ("documentation", "sources")
-_CHECKS: Sequence[Callable[[ModelDescription], Iterator[Finding]]] = (
+_CHECKS: Sequence[Callable[[ModelDescription], Iterator[Violation]]] = (
     *rules_model.CHECKS,
     *rules_variables.CHECKS,
     rules_variables.check_starts,
     *rules_model.STRUCTURE_CHECKS,
+    rules_variables.check_dimensions,
 )
 
 
@@ -95,14 +69,13 @@ class Examination:
     binary_findings: dict[Interface, list[Finding]] = field(default_factory=dict)
 
 
-def examine(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> Examination:
+def examine(path: Path) -> Examination:
     """Check archive, model description and binary of an FMU.
 
     Nothing is extracted or executed.
 
     Args:
         path: The FMU.
-        limits: Limits of the check.
 
     Returns:
         The result; problems of the FMU itself are findings, not exceptions.
@@ -114,7 +87,7 @@ def examine(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> Examination
     with open_regular_file(path) as file:
         result.file_identity = _file_identity(file)
         try:
-            _examine_archive(Archive(file, limits), limits, result)
+            _examine_archive(Archive(file), result)
         except FatalFindingError as error:
             result.findings.append(error.finding)
         except OSError as error:
@@ -122,75 +95,66 @@ def examine(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> Examination
     return result
 
 
-def _examine_archive(archive: Archive, limits: PreflightLimits, result: Examination) -> None:
+def _examine_archive(archive: Archive, result: Examination) -> None:
     """Check the archive; read and check its members only if it has no errors."""
     result.findings += archive.findings
     if _has_errors(archive.findings):
         return
     result.members = {name: entry.crc for name, entry in archive.members.items()}
     if DESCRIPTION_FILE not in archive.members:
-        raise FatalFindingError(MISSING(f"there is no member '{DESCRIPTION_FILE}' in the archive"))
-    root = parse_xml(archive.read(DESCRIPTION_FILE), DESCRIPTION_FILE, limits)
+        raise FatalFindingError(
+            "archive.description", f"there is no member '{DESCRIPTION_FILE}' in the archive"
+        )
+    root = parse_xml(archive.read(DESCRIPTION_FILE), DESCRIPTION_FILE)
     model = result.model = read_model(root)
     result.findings += check_repeated_elements(root)
     for check in _CHECKS:
-        result.findings += islice(check(model), _MAX_FINDINGS_PER_CHECK)
-    result.findings += islice(
-        rules_variables.check_dimensions(model, limits), _MAX_FINDINGS_PER_CHECK
-    )
+        result.findings += starmap(to_finding, islice(check(model), _MAX_FINDINGS_PER_CHECK))
     if not _has_errors(result.findings):
         for interface in model.interfaces:
-            result.binary_findings[interface] = list(
-                _binary_findings(archive, model, interface, limits)
-            )
-
-
-def _binary_findings(
-    archive: Archive, model: ModelDescription, interface: Interface, limits: PreflightLimits
-) -> Iterator[Finding]:
-    try:
-        yield from check_binary(archive, model, interface, current_platform(), limits)
-    except FatalFindingError as error:
-        yield error.finding
+            found = result.binary_findings[interface] = []
+            try:
+                found += check_binary(archive, model, interface, current_platform())
+            except FatalFindingError as error:
+                found.append(error.finding)
 
 
 def _has_errors(findings: Sequence[Finding]) -> bool:
-    return any(finding.rule.severity == "error" for finding in findings)
+    return any(finding.severity == "error" for finding in findings)
 
 
-def extract(
-    path: Path, examination: Examination, folder: Path, limits: PreflightLimits = DEFAULT_LIMITS
-) -> None:
+def extract(path: Path, examination: Examination, folder: Path) -> None:
     """Extract the members of an examined FMU that it can use on this platform.
 
     Args:
         path: The FMU.
         examination: Result of the preflight check.
         folder: Folder that receives the files.
-        limits: Limits of the check.
 
     Raises:
         InputError: The file was changed after the check, or contains damaged data.
     """
     assert examination.model is not None  # otherwise the FMU has errors and is not used
     binary_folder = current_platform().binary_folder(examination.model.major)
+
+    def is_used(name: str) -> bool:
+        """Return False for sources, documentation and binaries of other platforms."""
+        first, _, rest = name.partition("/")
+        return first not in _UNUSED_FOLDERS and (
+            first != "binaries" or rest.partition("/")[0] == binary_folder
+        )
+
     with open_regular_file(path) as file:
         try:
             if _file_identity(file) != examination.file_identity:
-                raise FatalFindingError(CHANGED("the file was changed after it had been examined"))
-            archive = Archive(file, limits)
+                raise FatalFindingError(
+                    "archive.changed", "the file was changed after it had been examined"
+                )
+            archive = Archive(file)
             raise_errors(path, archive.findings)
-            archive.extract(folder, partial(_is_used, binary_folder=binary_folder))
+            archive.extract(folder, is_used)
         except FatalFindingError as error:
             raise_errors(path, [error.finding])
-
-
-def _is_used(name: str, binary_folder: str) -> bool:
-    """Return False for sources, documentation and binaries of other platforms."""
-    first, _, rest = name.partition("/")
-    return first not in _UNUSED_FOLDERS and (
-        first != "binaries" or rest.partition("/")[0] == binary_folder
-    )
 
 
 def _file_identity(file: BufferedReader) -> tuple[int, ...]:

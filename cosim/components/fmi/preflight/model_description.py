@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from ....core.component import DTYPES
+from .findings import DESCRIPTION_FILE, Finding
 
 _FLOAT = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?INF|NaN")
 _INTEGER = re.compile(r"[+-]?[0-9]{1,20}")
@@ -85,8 +86,7 @@ ALLOWED_INITIAL: Mapping[tuple[str, str], Sequence[str]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class TypeDefinition:
+class TypeDefinition(NamedTuple):
     """Declared type.
 
     Attributes:
@@ -104,8 +104,7 @@ class TypeDefinition:
     line: int
 
 
-@dataclass(frozen=True, slots=True)
-class ModelVariable:
+class ModelVariable(NamedTuple):
     """Model variable.
 
     Attributes:
@@ -152,8 +151,18 @@ class ModelVariable:
         return f'variable "{self.name}"'
 
 
-@dataclass(frozen=True, slots=True)
-class Unknown:
+#: violated rule, variable or line in the file, and what was found and expected
+Violation = tuple[str, ModelVariable | int, str]
+
+
+def to_finding(rule: str, place: ModelVariable | int, message: str) -> Finding:
+    """Return the finding for a violation."""
+    if isinstance(place, int):
+        return Finding(rule, message, DESCRIPTION_FILE, place)
+    return Finding(rule, f"{place}: {message}", DESCRIPTION_FILE, place.line)
+
+
+class Unknown(NamedTuple):
     """Element of the model structure.
 
     Attributes:
@@ -171,8 +180,7 @@ class Unknown:
     line: int
 
 
-@dataclass(frozen=True, slots=True)
-class UnitDefinition:
+class UnitDefinition(NamedTuple):
     """Unit definition.
 
     Attributes:

@@ -13,42 +13,15 @@ from collections.abc import Generator, Iterator, Mapping, Sequence
 from itertools import islice
 
 from ....core.errors import did_you_mean
-from .findings import DESCRIPTION_FILE, Finding, PreflightLimits, Rule
+from ....core.size_limits import MAX_SCALARS
 from .model_description import (
     ALLOWED_INITIAL,
     ModelDescription,
     ModelVariable,
+    Violation,
     parse_float,
     parse_value,
 )
-
-_VARIABLES = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7"
-_ATTRIBUTES = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.4"
-_TYPE_SPECIFIC = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.5"
-_UNITS = "FMI 2.0.5 section 2.2.2, FMI 3.0.2 section 2.4.3"
-
-NAME = Rule("variable.name", _VARIABLES)
-UNIQUE = Rule("variable.unique", _VARIABLES, "warning")
-CONVENTION = Rule(
-    "variable.convention", "FMI 2.0.5 section 2.2.9, FMI 3.0.2 section 2.4.7.5.1", "warning"
-)
-KIND = Rule("variable.type", _VARIABLES)
-ATTRIBUTE_VALUE = Rule("variable.word", _ATTRIBUTES)
-COMBINATION = Rule("variable.combination", _ATTRIBUTES, "warning")
-CONTINUOUS = Rule("variable.continuous", _ATTRIBUTES, "warning")
-IMPLIED = Rule("variable.implied-continuous", _ATTRIBUTES, "warning")
-INITIAL_RULE = Rule("variable.initial", _TYPE_SPECIFIC, "warning")
-INITIAL_NOT_ALLOWED = Rule("variable.initial-not-allowed", _TYPE_SPECIFIC, "warning")
-INDEPENDENT = Rule("variable.independent", _ATTRIBUTES, "warning")
-REFERENCE = Rule("reference.value", _ATTRIBUTES)
-SHARED = Rule("reference.shared", _ATTRIBUTES)
-ALIAS = Rule("reference.alias", _ATTRIBUTES, "warning")
-DECLARED = Rule("variable.declared-type", _TYPE_SPECIFIC, "warning")
-OTHER_TYPE = Rule("variable.other-type", _TYPE_SPECIFIC)
-UNIT = Rule("variable.unit", _UNITS, "warning")
-DISPLAY_UNIT = Rule("variable.display-unit", _UNITS, "warning")
-DERIVATIVE = Rule("variable.derivative", _TYPE_SPECIFIC)
-CLOCK = Rule("variable.clocks", "FMI 3.0.2 section 2.4.7.4")
 
 _ATTRIBUTE_VALUES = {
     "causality": (
@@ -76,29 +49,23 @@ _MAX_HINT_CANDIDATES = 200
 _ACCESSOR_TYPES = {"Enumeration": "Int32"}
 
 
-def check_identity(model: ModelDescription) -> Iterator[Finding]:
+def check_identity(model: ModelDescription) -> Iterator[Violation]:
     """Check that variable names are printable, unique and follow the declared naming convention."""
     first_lines: dict[str, int] = {}
     is_structured = model.root.get("variableNamingConvention") == "structured"
     for name, line in _all_names(model):
         if not name or not name.isprintable():
-            yield NAME(
-                f'found the variable name "{name}", expected one without control characters',
-                DESCRIPTION_FILE,
-                line,
-            )
+            text = f'found the variable name "{name}", expected one without control characters'
+            yield "variable.name", line, text
         elif is_structured and not _STRUCTURED_NAME.fullmatch(name):
-            yield CONVENTION(
-                f'the name "{name}" does not follow the structured naming convention',
-                DESCRIPTION_FILE,
-                line,
-            )
+            text = f'the name "{name}" does not follow the structured naming convention'
+            yield "variable.convention", line, text
         if name in first_lines:
             text = (
                 f'the variable name "{name}" is already used in line {first_lines[name]}; this one '
                 "is ignored"
             )
-            yield UNIQUE(text, DESCRIPTION_FILE, line)
+            yield "variable.unique", line, text
         first_lines.setdefault(name, line)
 
 
@@ -109,44 +76,45 @@ def _all_names(model: ModelDescription) -> Iterator[tuple[str, int]]:
             yield alias.get("name", ""), variable.line
 
 
-def check_kinds(model: ModelDescription) -> Iterator[Finding]:
+def check_kinds(model: ModelDescription) -> Iterator[Violation]:
     """Check that type, causality, variability and initial are valid and allowed in combination."""
     for variable in model.variables:
         if not variable.kind:
-            yield _variable_finding(KIND, variable, "has no type that this FMI version defines")
+            yield "variable.type", variable, "has no type that this FMI version defines"
         invalid_values = list(_check_attribute_values(variable))
         yield from invalid_values
         if not invalid_values and variable.kind != "Clock":
             yield from _check_combination(model, variable)
     count = sum(variable.causality == "independent" for variable in model.variables)
     if count > 1 or (model.major == 3 and count == 0):
-        yield INDEPENDENT(
-            f"found {count} independent variables, expected one", DESCRIPTION_FILE, model.lines[""]
+        yield (
+            "variable.independent",
+            model.lines[""],
+            f"found {count} independent variables, expected one",
         )
 
 
-def _check_attribute_values(variable: ModelVariable) -> Iterator[Finding]:
+def _check_attribute_values(variable: ModelVariable) -> Iterator[Violation]:
     for attribute, words in _ATTRIBUTE_VALUES.items():
         word = variable.attributes.get(attribute, words[0])
         if word not in words:
-            yield _variable_finding(
-                ATTRIBUTE_VALUE, variable, f'found {attribute}="{word}"{did_you_mean(word, words)}'
-            )
+            text = f'found {attribute}="{word}"{did_you_mean(word, words)}'
+            yield "variable.word", variable, text
 
 
-def _check_combination(model: ModelDescription, variable: ModelVariable) -> Iterator[Finding]:
+def _check_combination(model: ModelDescription, variable: ModelVariable) -> Iterator[Violation]:
     causality, variability = variable.causality, variable.variability
     allowed = ALLOWED_INITIAL.get((causality, variability))
     if allowed is None:
         text = f'causality="{causality}" is not allowed with variability="{variability}"'
-        yield _variable_finding(COMBINATION, variable, text)
+        yield "variable.combination", variable, text
         return
     if variability == "continuous" and variable.kind and not variable.is_float:
         text = (
             f'type {variable.kind} is not allowed with variability="continuous"; it is treated as '
             "discrete"
         )
-        yield _variable_finding(CONTINUOUS, variable, text)
+        yield "variable.continuous", variable, text
     if (
         model.major == 2
         and "variability" not in variable.attributes
@@ -157,64 +125,61 @@ def _check_combination(model: ModelDescription, variable: ModelVariable) -> Iter
             f"lacks the attribute variability; its default is continuous, but {variable.kind} is "
             "treated as discrete"
         )
-        yield _variable_finding(IMPLIED, variable, text)
+        yield "variable.implied-continuous", variable, text
     initial = variable.attributes.get("initial")
     if initial and (causality == "independent" or (causality == "input" and model.major == 2)):
         text = f'found initial="{initial}", expected none for causality="{causality}"'
-        yield _variable_finding(INITIAL_NOT_ALLOWED, variable, text)
+        yield "variable.initial-not-allowed", variable, text
     elif initial and initial not in allowed:
         text = (
             f'initial="{initial}" is not allowed with causality="{causality}" and '
             f'variability="{variability}"'
         )
-        yield _variable_finding(INITIAL_RULE, variable, text)
+        yield "variable.initial", variable, text
 
 
-def check_references(model: ModelDescription) -> Iterator[Finding]:
+def check_references(model: ModelDescription) -> Iterator[Violation]:
     """Check value references: unique in FMI 3.0, shared only by aliases in FMI 2.0."""
     groups: dict[tuple[str, int], list[ModelVariable]] = defaultdict(list)
     for variable in model.variables:
         text = variable.attributes.get("valueReference", "")
         if not re.fullmatch(r"\s*\+?[0-9]{1,10}\s*", text) or int(text) >= 2**32:
             message = f'found valueReference="{text}", expected an integer from 0 to 4294967295'
-            yield _variable_finding(REFERENCE, variable, message)
+            yield "reference.value", variable, message
         else:
             kind = _ACCESSOR_TYPES.get(variable.kind, variable.kind) if model.major < 3 else ""
             groups[kind, int(text)].append(variable)
     for group in groups.values():
-        if len(group) > 1 and model.major > 1:  # FMI 1.0 allows aliases of all variables
-            yield from (
-                _check_shared_references(group) if model.major == 3 else _check_aliases(group)
-            )
+        if model.major == 3:
+            for variable in group[1:]:
+                text = f'has the same value reference as "{group[0].name}", expected a unique one'
+                yield "reference.shared", variable, text
+        elif model.major == 2:  # FMI 1.0 allows aliases of all variables
+            yield from _check_aliases(group)
 
 
-def _check_shared_references(group: Sequence[ModelVariable]) -> Iterator[Finding]:
-    for variable in group[1:]:
-        text = f'has the same value reference as "{group[0].name}", expected a unique one'
-        yield _variable_finding(SHARED, variable, text)
-
-
-def _check_aliases(group: Sequence[ModelVariable]) -> Iterator[Finding]:
+def _check_aliases(group: Sequence[ModelVariable]) -> Iterator[Violation]:
     settable = [variable for variable in group if variable.causality in ("input", "parameter")]
     for variable in settable[1:]:
         text = (
             f'has the same value reference as "{settable[0].name}", expected a unique one for each '
             "input and parameter"
         )
-        yield _variable_finding(SHARED, variable, text)
+        yield "reference.shared", variable, text
     first = group[0]
     for variable in group[1:]:
         if (variable.variability == "constant") != (first.variability == "constant"):
-            yield _variable_finding(
-                ALIAS, variable, f'is an alias of "{first.name}", but only one of them is constant'
-            )
+            text = f'is an alias of "{first.name}", but only one of them is constant'
+            yield "reference.alias", variable, text
         if variable.attribute("unit") != first.attribute("unit"):
-            yield _variable_finding(
-                ALIAS, variable, f'is an alias of "{first.name}", but has another unit'
+            yield (
+                "reference.alias",
+                variable,
+                f'is an alias of "{first.name}", but has another unit',
             )
 
 
-def check_declarations(model: ModelDescription) -> Iterator[Finding]:
+def check_declarations(model: ModelDescription) -> Iterator[Violation]:
     """Check that the declared types, units, states and clocks that variables refer to exist."""
     units = {unit.name: unit.display_units for unit in model.units}
     for variable in model.variables:
@@ -223,100 +188,80 @@ def check_declarations(model: ModelDescription) -> Iterator[Finding]:
         state = variable.attributes.get("derivative", "").strip()
         if state and (state not in model.by_reference or not model.by_reference[state].is_float):
             text = f'found derivative="{state}", expected a reference to a floating-point variable'
-            yield _variable_finding(DERIVATIVE, variable, text)
+            yield "variable.derivative", variable, text
         for clock in variable.attributes.get("clocks", "").split():
             if clock not in model.by_reference or model.by_reference[clock].kind != "Clock":
-                yield _variable_finding(
-                    CLOCK,
-                    variable,
-                    f'found "{clock}" in its clocks, expected a reference to a clock',
-                )
+                text = f'found "{clock}" in its clocks, expected a reference to a clock'
+                yield "variable.clocks", variable, text
 
 
-def _check_declared_type(model: ModelDescription, variable: ModelVariable) -> Iterator[Finding]:
+def _check_declared_type(model: ModelDescription, variable: ModelVariable) -> Iterator[Violation]:
     name = variable.attributes.get("declaredType")
     if name is None:
         if variable.kind == "Enumeration" and model.major > 1:
-            yield _variable_finding(DECLARED, variable, "is an enumeration without declaredType")
+            yield "variable.declared-type", variable, "is an enumeration without declaredType"
     elif variable.declared_type is None:
         hint = did_you_mean(
             name, (definition.name for definition in model.types[:_MAX_HINT_CANDIDATES])
         )
-        yield _variable_finding(
-            DECLARED, variable, f'found declaredType="{name}", which is not defined{hint}'
+        yield (
+            "variable.declared-type",
+            variable,
+            f'found declaredType="{name}", which is not defined{hint}',
         )
     elif variable.kind and variable.declared_type.kind not in ("", variable.kind):
         text = (
             f'the type "{name}" is {variable.declared_type.kind}, but the variable is '
             f"{variable.kind}"
         )
-        yield _variable_finding(OTHER_TYPE, variable, text)
+        yield "variable.other-type", variable, text
 
 
-def _check_units(variable: ModelVariable, units: dict[str, Sequence[str]]) -> Iterator[Finding]:
+def _check_units(variable: ModelVariable, units: dict[str, Sequence[str]]) -> Iterator[Violation]:
     if not variable.is_float:
         return
     unit, display = variable.attribute("unit"), variable.attributes.get("displayUnit")
     if unit is not None and unit not in units:
         hint = did_you_mean(unit, islice(units, _MAX_HINT_CANDIDATES))
-        yield _variable_finding(UNIT, variable, f'the unit "{unit}" is not defined{hint}')
+        yield "variable.unit", variable, f'the unit "{unit}" is not defined{hint}'
     elif display is not None and display not in units.get(unit or "", ()):
-        yield _variable_finding(
-            DISPLAY_UNIT,
-            variable,
-            f'the display unit "{display}" is not defined for unit "{unit or ""}"',
-        )
-
-
-def _variable_finding(rule: Rule, variable: ModelVariable, text: str) -> Finding:
-    return rule(f"{variable}: {text}", DESCRIPTION_FILE, variable.line)
+        text = f'the display unit "{display}" is not defined for unit "{unit or ""}"'
+        yield "variable.display-unit", variable, text
 
 
 CHECKS = (check_identity, check_kinds, check_references, check_declarations)
 
 
-_START = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.5"
-_DIMENSION = "FMI 3.0.2 section 2.4.7.2"
-
-MISSING = Rule("start.missing", _START, "warning")
-UNEXPECTED = Rule("start.unwanted", _START, "warning")
-VALUE = Rule("start.value", _START)
-FINITE = Rule("start.finite", _START)
-INFINITE = Rule("start.infinite", _START, "warning")
-RANGE = Rule("start.range", _START, "warning")
-COUNT = Rule("start.count", "FMI 3.0.2 section 2.4.7.5")
-LIMIT = Rule("variable.limits", _START, "warning")
-LIMIT_VALUE = Rule("variable.limit-value", _START, "warning")
-DIMENSION = Rule("variable.dimension", _DIMENSION)
-SIZE = Rule("variable.size", "limits")
-
+#: largest number of elements of one array variable
+MAX_ARRAY_SIZE = 1_000_000
 _NON_NUMERIC_TYPES = ("String", "Binary", "Clock", "")
 
 
-def check_starts(model: ModelDescription) -> Iterator[Finding]:
+def check_starts(model: ModelDescription) -> Iterator[Violation]:
     """Check that start values exist where required, are valid, and are between min and max."""
     for variable in model.variables:
         if (
             variable.kind not in ("Clock", "") and model.major > 1
         ):  # FMI 1.0 requires no start values
-            yield from _check_start_presence(variable)
+            initial, causality = variable.initial, variable.causality
+            if not variable.start_words and (
+                initial in ("exact", "approx") or causality == "input"
+            ):
+                reason = "inputs" if causality == "input" else f'initial="{initial}"'
+                text = f"has no start value, which is required for {reason}"
+                yield "start.missing", variable, text
+            if variable.start_words is not None and (
+                initial == "calculated" or causality == "independent"
+            ):
+                reason = (
+                    "it is independent" if causality == "independent" else 'initial="calculated"'
+                )
+                yield "start.unwanted", variable, f"has a start value, but {reason}"
         if variable.kind not in _NON_NUMERIC_TYPES:
             yield from _check_start_values(variable)
 
 
-def _check_start_presence(variable: ModelVariable) -> Iterator[Finding]:
-    initial, causality = variable.initial, variable.causality
-    if not variable.start_words and (initial in ("exact", "approx") or causality == "input"):
-        reason = "inputs" if causality == "input" else f'initial="{initial}"'
-        yield _variable_finding(
-            MISSING, variable, f"has no start value, which is required for {reason}"
-        )
-    if variable.start_words is not None and (initial == "calculated" or causality == "independent"):
-        reason = "it is independent" if causality == "independent" else 'initial="calculated"'
-        yield _variable_finding(UNEXPECTED, variable, f"has a start value, but {reason}")
-
-
-def _check_start_values(variable: ModelVariable) -> Iterator[Finding]:
+def _check_start_values(variable: ModelVariable) -> Iterator[Violation]:
     low, high = yield from _read_limits(variable)
     for word in variable.start_words or ():
         try:
@@ -326,20 +271,25 @@ def _check_start_values(variable: ModelVariable) -> Iterator[Finding]:
                 f'start value "{" ".join(variable.start_words or ())}" of {variable} is not a '
                 f"valid {variable.kind}"
             )
-            yield VALUE(text, DESCRIPTION_FILE, variable.line)
+            yield "start.value", variable.line, text
             return
         if not math.isfinite(number):
             is_allowed = math.isinf(number) and variable.causality not in ("input", "output")
             text = f"found start value {word}, expected a finite number"
-            yield _variable_finding(INFINITE if is_allowed else FINITE, variable, text)
+            yield "start.infinite" if is_allowed else "start.finite", variable, text
         elif not low <= number <= high:
-            yield _variable_finding(
-                RANGE, variable, f"found start value {word}, expected {low:g} to {high:g}"
-            )
-    yield from _check_enumeration_start(variable)
+            yield "start.range", variable, f"found start value {word}, expected {low:g} to {high:g}"
+    if variable.kind == "Enumeration" and variable.declared_type and variable.declared_type.items:
+        values = {item[1].strip() for item in variable.declared_type.items}
+        for word in variable.start_words or ():
+            if word not in values:
+                text = (
+                    f'found start value {word}, expected an item of "{variable.declared_type.name}"'
+                )
+                yield "start.range", variable, text
 
 
-def _read_limits(variable: ModelVariable) -> Generator[Finding, None, tuple[float, float]]:
+def _read_limits(variable: ModelVariable) -> Generator[Violation, None, tuple[float, float]]:
     """Return (min, max), infinite for a limit that is missing or invalid.
 
     Yield findings about invalid limits.
@@ -350,15 +300,11 @@ def _read_limits(variable: ModelVariable) -> Generator[Finding, None, tuple[floa
             continue
         limit = read_limit(text)
         if limit is None:
-            yield _variable_finding(
-                LIMIT_VALUE, variable, f'found {name}="{text}", expected a number'
-            )
+            yield "variable.limit-value", variable, f'found {name}="{text}", expected a number'
         else:
             limits[name] = limit
     if limits["min"] > limits["max"]:
-        yield _variable_finding(
-            LIMIT, variable, f"min {limits['min']:g} is above max {limits['max']:g}"
-        )
+        yield "variable.limits", variable, f"min {limits['min']:g} is above max {limits['max']:g}"
         return -math.inf, math.inf
     return limits["min"], limits["max"]
 
@@ -379,18 +325,7 @@ def read_limit(text: str) -> float | None:
     return None if math.isnan(limit) else limit
 
 
-def _check_enumeration_start(variable: ModelVariable) -> Iterator[Finding]:
-    if variable.kind == "Enumeration" and variable.declared_type and variable.declared_type.items:
-        values = {item[1].strip() for item in variable.declared_type.items}
-        for word in variable.start_words or ():
-            if word not in values:
-                text = (
-                    f'found start value {word}, expected an item of "{variable.declared_type.name}"'
-                )
-                yield _variable_finding(RANGE, variable, text)
-
-
-def check_dimensions(model: ModelDescription, limits: PreflightLimits) -> Iterator[Finding]:
+def check_dimensions(model: ModelDescription) -> Iterator[Violation]:
     """Check dimensions and numbers of start values of arrays, and the number of all elements."""
     scalars = 0
     for variable in model.variables:
@@ -401,28 +336,30 @@ def check_dimensions(model: ModelDescription, limits: PreflightLimits) -> Iterat
         if shape is None:
             continue
         size = math.prod(shape)
-        if size > limits.max_array_size:
-            yield _variable_finding(
-                SIZE, variable, f"has {size} elements, expected at most {limits.max_array_size}"
+        if size > MAX_ARRAY_SIZE:
+            yield (
+                "variable.size",
+                variable,
+                f"has {size} elements, expected at most {MAX_ARRAY_SIZE}",
             )
             continue
         scalars += size * (1 + len(variable.aliases))
-        if scalars > limits.max_scalars:
+        if scalars > MAX_SCALARS:
             text = (
                 f"the variables up to this one have {scalars} elements, expected at most "
-                f"{limits.max_scalars}"
+                f"{MAX_SCALARS}"
             )
-            yield _variable_finding(SIZE, variable, text)
+            yield "variable.size", variable, text
             return
         if variable.start_words and len(variable.start_words) not in (1, size):
             count = len(variable.start_words)
             text = f"found {count} start value{'s' if count > 1 else ''}, expected {size}"
-            yield _variable_finding(COUNT, variable, text)
+            yield "start.count", variable, text
 
 
 def _read_shape(
     model: ModelDescription, variable: ModelVariable
-) -> Generator[Finding, None, Sequence[int] | None]:
+) -> Generator[Violation, None, Sequence[int] | None]:
     """Return the shape, or None if a dimension is invalid.
 
     Yield findings about invalid dimensions.
@@ -432,8 +369,11 @@ def _read_shape(
         if size is None or size < 1:
             found = " ".join(f'{name}="{text}"' for name, text in dimension.items()) or "nothing"
             expected = "start > 0, or the value reference of a structural parameter with start > 0"
-            text = f"found a dimension with {found}, expected {expected}"
-            yield _variable_finding(DIMENSION, variable, text)
+            yield (
+                "variable.dimension",
+                variable,
+                f"found a dimension with {found}, expected {expected}",
+            )
     valid = [size for size in sizes if size]
     return valid if len(valid) == len(sizes) else None
 

@@ -16,17 +16,9 @@ from lxml import etree
 
 from . import Examination, examine
 from .archive import Archive, open_regular_file
-from .findings import (
-    DEFAULT_LIMITS,
-    DESCRIPTION_FILE,
-    FatalFindingError,
-    Finding,
-    PreflightLimits,
-    Rule,
-)
+from .findings import DESCRIPTION_FILE, FatalFindingError, Finding
 from .xml import parse_xml
 
-SCHEMA = Rule("xml.schema", "XML schemas of FMI 1.0.1, 2.0.5 and 3.0.2", "warning")
 #: (FMI major version, member of the archive) -> schema file of FMPy
 SCHEMA_FILES = {
     (1, DESCRIPTION_FILE): "fmi1/fmiModelDescription.xsd",
@@ -57,7 +49,7 @@ def check_schema(root: Any, member: str, major: int) -> Iterator[Finding]:
     schema = _load_schema(SCHEMA_FILES[major, member])
     if not schema.validate(root):
         for error in schema.error_log:
-            yield SCHEMA(error.message.rstrip("."), member, error.line)
+            yield Finding("xml.schema", error.message.rstrip("."), member, error.line)
 
 
 #: largest model that is checked by schemas, because their uniqueness constraints take quadratic
@@ -65,12 +57,11 @@ def check_schema(root: Any, member: str, major: int) -> Iterator[Finding]:
 MAX_SCHEMA_VARIABLES = 10_000
 
 
-def validate_fmu(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> Sequence[Finding]:
+def validate_fmu(path: Path) -> Sequence[Finding]:
     """Check an FMU completely.
 
     Args:
         path: The FMU.
-        limits: Limits of the check.
 
     Returns:
         All findings, errors first.
@@ -78,37 +69,33 @@ def validate_fmu(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> Sequen
     Raises:
         InputError: The file does not exist or cannot be read.
     """
-    examination = examine(path, limits)
+    examination = examine(path)
     findings = [*examination.findings, *chain.from_iterable(examination.binary_findings.values())]
     if examination.members:
         with open_regular_file(path) as file:
-            archive = Archive(file, limits)
+            archive = Archive(file)
             findings += archive.verify()
-            if all(finding.rule.severity == "warning" for finding in findings):
-                findings += _check_xml_files(archive, examination, limits)
+            if all(finding.severity == "warning" for finding in findings):
+                findings += _check_xml_files(archive, examination)
     # a schema often reports, less clearly, the same problem as a rule
     locations = {
-        finding.location
-        for finding in findings
-        if finding.line and finding.rule.name != "xml.schema"
+        finding.location for finding in findings if finding.line and finding.rule != "xml.schema"
     }
     unique = [
         finding
         for finding in findings
-        if finding.rule.name != "xml.schema" or finding.location not in locations
+        if finding.rule != "xml.schema" or finding.location not in locations
     ]
-    return sorted(dict.fromkeys(unique), key=lambda finding: finding.rule.severity)
+    return sorted(dict.fromkeys(unique), key=lambda finding: finding.severity)
 
 
-def _check_xml_files(
-    archive: Archive, examination: Examination, limits: PreflightLimits
-) -> Iterator[Finding]:
+def _check_xml_files(archive: Archive, examination: Examination) -> Iterator[Finding]:
     model = examination.model
     assert model is not None  # otherwise the examination has found an error
     for version, member in SCHEMA_FILES:
         if version == model.major and member in archive.members:
             try:
-                root = parse_xml(archive.read(member), member, limits)
+                root = parse_xml(archive.read(member), member)
                 if len(model.variables) <= MAX_SCHEMA_VARIABLES:
                     yield from check_schema(root, member, model.major)
             except FatalFindingError as error:

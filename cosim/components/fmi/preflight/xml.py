@@ -10,13 +10,11 @@ from typing import Any
 
 from lxml import etree
 
-from .findings import FatalFindingError, PreflightLimits, Rule
+from ....core.text import MAX_TEXT_LENGTH
+from .findings import FatalFindingError
 
-SIZE = Rule("xml.size", "limits")
-ENCODING = Rule("xml.encoding", "FMI 2.0.5 section 2.2, FMI 3.0.2 section 2.4")
-DOCTYPE = Rule("xml.doctype", "safety: entities")
-SYNTAX = Rule("xml.syntax", "XML 1.0")
-
+#: largest size of an XML file (bytes) and number of its tags
+MAX_XML_SIZE, MAX_XML_TAGS = 1 << 25, 1_000_000
 #: accepted encodings; FMI requires UTF-8, but exporters use the others too
 _ENCODINGS = ("utf-8", "us-ascii", "ascii", "iso-8859-1", "windows-1252", "utf-16")
 _DECLARED = re.compile(rb"""\s*<\?xml[^>]*?\sencoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
@@ -31,13 +29,12 @@ _TOO_MANY_ATTRIBUTES = etree.XPath(f"//*[@*[{_MAX_ATTRIBUTES + 1}]]")
 _BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 
 
-def parse_xml(content: bytes, member: str, limits: PreflightLimits) -> Any:
+def parse_xml(content: bytes, member: str) -> Any:
     """Parse an XML document.
 
     Args:
         content: The document.
         member: Member of the archive, for messages.
-        limits: Limits of the document's size.
 
     Returns:
         The root element (lxml).
@@ -45,35 +42,37 @@ def parse_xml(content: bytes, member: str, limits: PreflightLimits) -> Any:
     Raises:
         FatalFindingError: The document is not well-formed, exceeds a limit or is not safe.
     """
-    if len(content) > limits.max_xml_size:
+    if len(content) > MAX_XML_SIZE:
         raise FatalFindingError(
-            SIZE(f"has {len(content)} bytes, expected at most {limits.max_xml_size}", member)
+            "xml.size", f"has {len(content)} bytes, expected at most {MAX_XML_SIZE}", member
         )
     content = _to_utf8(content, member)
     if (position := content.find(b"<!DOCTYPE")) >= 0:
         raise FatalFindingError(
-            DOCTYPE("found a DOCTYPE, expected none", member, content.count(b"\n", 0, position) + 1)
+            "xml.doctype",
+            "found a DOCTYPE, expected none",
+            member,
+            content.count(b"\n", 0, position) + 1,
         )
-    if (tags := content.count(b"<")) > limits.max_xml_tags:
+    if (tags := content.count(b"<")) > MAX_XML_TAGS:
         raise FatalFindingError(
-            SIZE(f"has {tags} tags, expected at most {limits.max_xml_tags}", member)
+            "xml.size", f"has {tags} tags, expected at most {MAX_XML_TAGS}", member
         )
-    root = _parse_tree(content, member, limits)
+    root = _parse_tree(content, member)
     for element in _TOO_MANY_ATTRIBUTES(root):
         raise FatalFindingError(
-            SIZE(
-                f"<{element.tag}> has more than {_MAX_ATTRIBUTES} attributes",
-                member,
-                element.sourceline,
-            )
+            "xml.size",
+            f"<{element.tag}> has more than {_MAX_ATTRIBUTES} attributes",
+            member,
+            element.sourceline,
         )
-    for text in _TOO_LONG_TEXTS(root, length=limits.max_text_length):
+    for text in _TOO_LONG_TEXTS(root, length=MAX_TEXT_LENGTH):
         where = f'attribute "{text.attrname}"' if text.is_attribute else "text"
         found = (
             f"<{text.getparent().tag}> has {where} with {len(text)} characters, expected at most "
-            f"{limits.max_text_length}"
+            f"{MAX_TEXT_LENGTH}"
         )
-        raise FatalFindingError(SIZE(found, member, text.getparent().sourceline))
+        raise FatalFindingError("xml.size", found, member, text.getparent().sourceline)
     return root
 
 
@@ -86,23 +85,26 @@ def _to_utf8(content: bytes, member: str) -> bytes:
     encoding = mark_encoding or (declared.group(1).decode().lower() if declared else "utf-8")
     if mark_encoding is None and encoding not in _ENCODINGS:
         raise FatalFindingError(
-            ENCODING(f'found encoding "{encoding}", expected "UTF-8"', member, 1)
+            "xml.encoding", f'found encoding "{encoding}", expected "UTF-8"', member, 1
         )
     try:
         text = content.decode(encoding)
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise FatalFindingError(
-            ENCODING(f"is not {encoding.removesuffix('-sig')} text: {error.reason}", member, line)
+            "xml.encoding",
+            f"is not {encoding.removesuffix('-sig')} text: {error.reason}",
+            member,
+            line,
         ) from None
     if "\0" in text:
         raise FatalFindingError(
-            ENCODING("contains null characters, expected UTF-8 text", member, 1)
+            "xml.encoding", "contains null characters, expected UTF-8 text", member, 1
         )
     return content if encoding == "utf-8" else text.encode()
 
 
-def _parse_tree(content: bytes, member: str, limits: PreflightLimits) -> Any:
+def _parse_tree(content: bytes, member: str) -> Any:
     parser = etree.XMLParser(
         encoding="utf-8",
         resolve_entities=False,
@@ -117,10 +119,10 @@ def _parse_tree(content: bytes, member: str, limits: PreflightLimits) -> Any:
     except etree.XMLSyntaxError as error:
         line, column = error.position
         if _LIBRARY_LIMIT in error.msg:
-            found = f"has an attribute or text with more than {limits.max_text_length} characters"
-            raise FatalFindingError(SIZE(found, member, line)) from None
+            found = f"has an attribute or text with more than {MAX_TEXT_LENGTH} characters"
+            raise FatalFindingError("xml.size", found, member, line) from None
         raise FatalFindingError(
-            SYNTAX(f"is not well-formed XML: {error.msg} (column {column})", member, line)
+            "xml.syntax", f"is not well-formed XML: {error.msg} (column {column})", member, line
         ) from None
     except (ValueError, LookupError) as error:
-        raise FatalFindingError(SYNTAX(f"is not well-formed XML: {error}", member)) from None
+        raise FatalFindingError("xml.syntax", f"is not well-formed XML: {error}", member) from None

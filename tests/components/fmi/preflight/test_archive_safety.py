@@ -14,7 +14,7 @@ import pytest
 from bad_fmus import Member, find_problems, members, pack_archive, refusal_message, with_headers
 
 from cosim.components.fmi import FmuFile
-from cosim.components.fmi.preflight import PreflightLimits
+from cosim.components.fmi.preflight import archive, binary, xml, zip_format
 from cosim.core.errors import InputError
 
 EXTRA = Member("resources/data.txt", b"data " * 50)
@@ -254,7 +254,7 @@ def test_bad_archives_are_refused(case, good, tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(inside))
     begin = time.process_time()
     assert words in refusal_message(path)
-    assert (rule, True) in [(f.rule.name, words in f.message) for f in find_problems(path)]
+    assert (rule, True) in [(f.rule, words in f.message) for f in find_problems(path)]
     assert time.process_time() - begin < 1
     assert list(inside.iterdir()) == []
     assert sorted(tmp_path.iterdir()) == [path, inside]
@@ -322,9 +322,7 @@ def test_archives_of_common_tools_are_accepted(harmless, good, tmp_path):
 def test_bytes_between_members_are_a_warning(front, good, tmp_path):
     path = tmp_path / "gap.fmu"
     path.write_bytes(pack_archive(members(good[2]), front=front))
-    assert [(f.rule.name, f.rule.severity) for f in find_problems(path)] == [
-        ("archive.gap", "warning")
-    ]
+    assert [(f.rule, f.severity) for f in find_problems(path)] == [("archive.gap", "warning")]
     assert FmuFile(path).description.model_name == "Probe"
 
 
@@ -357,21 +355,23 @@ def test_a_symbolic_link_to_a_valid_fmu_is_accepted(probes, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("limits", "words"),
+    ("module", "limits", "words"),
     [
-        (PreflightLimits(max_members=1), "found 2 members, expected at most 1"),
-        (PreflightLimits(max_expanded_size=1000), "bytes, expected at most 1000"),
-        (PreflightLimits(max_ratio=2, ratio_threshold=1000), "expected at most 2 times as many"),
-        (PreflightLimits(max_library_size=1000), "the library has .* bytes, expected at most 1000"),
-        (PreflightLimits(max_xml_size=100), "bytes, expected at most 100"),
-        (PreflightLimits(max_xml_tags=5), "tags, expected at most 5"),
+        (zip_format, {"MAX_MEMBERS": 1}, "found 2 members, expected at most 1"),
+        (archive, {"MAX_EXPANDED_SIZE": 1000}, "bytes, expected at most 1000"),
+        (archive, {"MAX_RATIO": 2, "RATIO_THRESHOLD": 1000}, "expected at most 2 times as many"),
+        (binary, {"MAX_LIBRARY_SIZE": 1000}, "the library has .* bytes, expected at most 1000"),
+        (xml, {"MAX_XML_SIZE": 100}, "bytes, expected at most 100"),
+        (xml, {"MAX_XML_TAGS": 5}, "tags, expected at most 5"),
     ],
 )
-def test_the_caller_sets_the_limits(limits, words, good, tmp_path):
+def test_an_fmu_above_a_limit_is_refused(module, limits, words, good, tmp_path, monkeypatch):
+    for name, value in limits.items():
+        monkeypatch.setattr(module, name, value)
     path = tmp_path / "good.fmu"
     path.write_bytes(pack_archive(members(good[2])))
     with pytest.raises(InputError, match=words):
-        FmuFile(path, limits).check_binary()
+        FmuFile(path).check_binary()
 
 
 def test_a_member_with_a_false_size_needs_no_memory(good, tmp_path):
@@ -387,13 +387,14 @@ def test_a_member_with_a_false_size_needs_no_memory(good, tmp_path):
     tracemalloc.stop()
 
 
-def test_a_huge_central_directory_is_not_read(good, tmp_path):
+def test_a_huge_central_directory_is_not_read(good, tmp_path, monkeypatch):
+    monkeypatch.setattr(zip_format, "MAX_MEMBERS", 3)
     path = tmp_path / "bad.fmu"
     path.write_bytes(pack_archive([*members(good[2]), with_headers(EXTRA, extra=bytes(60_000))]))
     with pytest.raises(
         InputError, match=r"found a central directory of 60[0-9]+ bytes, expected at most 12288"
     ):
-        _ = FmuFile(path, PreflightLimits(max_members=3)).description
+        _ = FmuFile(path).description
 
 
 def test_only_the_first_of_many_problems_are_listed(good, tmp_path):

@@ -8,7 +8,7 @@ import fmpy
 import pytest
 from bad_fmus import members, pack_archive
 
-from cosim.components.fmi.preflight import DEFAULT_LIMITS, examine, macho, open_regular_file
+from cosim.components.fmi.preflight import examine, macho, open_regular_file
 from cosim.components.fmi.preflight.archive import Archive
 from cosim.components.fmi.preflight.binary import check_binary
 from cosim.components.fmi.preflight.functions import standard_functions
@@ -153,14 +153,13 @@ def test_an_fmu_is_checked_for_macos(content, good, tmp_path, library, architect
     with open_regular_file(path) as file:
         findings = list(
             check_binary(
-                Archive(file, DEFAULT_LIMITS),
+                Archive(file),
                 examine(path).model,
                 "co-simulation",
                 machine,
-                DEFAULT_LIMITS,
             )
         )
-    assert [finding.rule.name for finding in findings] == (["binary.format"] if content else [])
+    assert [finding.rule for finding in findings] == (["binary.format"] if content else [])
 
 
 def test_mutants_are_read_or_refused(library, architecture):

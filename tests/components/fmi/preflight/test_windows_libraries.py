@@ -6,7 +6,7 @@ import struct
 import pytest
 from bad_fmus import read_members
 
-from cosim.components.fmi.preflight import DEFAULT_LIMITS, examine, open_regular_file, pe
+from cosim.components.fmi.preflight import examine, open_regular_file, pe
 from cosim.components.fmi.preflight.archive import Archive
 from cosim.components.fmi.preflight.binary import check_binary
 from cosim.components.fmi.preflight.functions import standard_functions
@@ -37,11 +37,10 @@ def test_an_fmu_with_a_windows_library_is_accepted():
         assert (
             list(
                 check_binary(
-                    Archive(file, DEFAULT_LIMITS),
+                    Archive(file),
                     examine(FMU).model,
                     "co-simulation",
                     WINDOWS,
-                    DEFAULT_LIMITS,
                 )
             )
             == []
