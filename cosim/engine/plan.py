@@ -160,7 +160,11 @@ def compile_plan(system: System, settings: Settings) -> Plan:
             reasons, see `check_run`.
     """
     grid = check_run(system, settings)
-    phases = list(_split_into_phases(system))
+    incoming: dict[str, list[Connection]] = defaultdict(list)
+    for connection in system.connections:
+        incoming[connection.target.component].append(connection)
+    inside = frozenset(system.components)
+    phases = list(_phases_of_stages(system.stages, system.parallel, inside, incoming))
     connections = list(chain.from_iterable(map(_connections_of, phases)))
     inputs = _input_layout(system, connections)
     outputs = _output_layout(
@@ -170,10 +174,14 @@ def compile_plan(system: System, settings: Settings) -> Plan:
     stepped: set[str] = set()
 
     def make_phase(draft: _PhaseDraft) -> Phase:
-        steps = tuple(_make_step(system, grid, name) for name in draft.names)
+        steps = []
+        for name in draft.names:
+            divisor = int(system.periods.get(name, grid.step) / grid.step)
+            step_size = float(grid.step * divisor)
+            steps.append(Step(name, system.components[name], divisor, step_size))
         transfers = tuple(planner.plan_transfers(draft.connections, stepped))
         stepped.update(draft.names)
-        return Phase(transfers, steps, draft.parallel, make_loop(draft.group, draft.inner))
+        return Phase(transfers, tuple(steps), draft.parallel, make_loop(draft.group, draft.inner))
 
     def make_loop(group: Group | None, inner: Sequence[_PhaseDraft]) -> Loop | None:
         if not group or not group.iteration:
@@ -183,17 +191,12 @@ def compile_plan(system: System, settings: Settings) -> Plan:
         return Loop(group.name, group.iteration, tuple(map(make_phase, inner)), connections)
 
     record_every = int((settings.record_interval or grid.step) / grid.step)
-    events = _events_by_point(settings.events, grid)
+    events: dict[int, list[Event]] = defaultdict(list)
+    for event in settings.events:
+        events[grid.index(event.time)].append(event)
     return Plan(
         system, settings, grid, record_every, events, inputs, outputs, list(map(make_phase, phases))
     )
-
-
-def _events_by_point(events: Iterable[Event], grid: TimeGrid) -> dict[int, list[Event]]:
-    points: dict[int, list[Event]] = defaultdict(list)
-    for event in events:
-        points[grid.index(event.time)].append(event)
-    return points
 
 
 def all_steps(phases: Iterable[Phase]) -> Iterator[Step]:
@@ -213,11 +216,6 @@ def _flatten_phases(phases: Iterable[Phase]) -> Iterator[Phase]:
             yield from _flatten_phases(phase.loop.phases)
 
 
-def _make_step(system: System, grid: TimeGrid, name: str) -> Step:
-    divisor = int(system.periods.get(name, grid.step) / grid.step)
-    return Step(name, system.components[name], divisor, float(grid.step * divisor))
-
-
 class _PhaseDraft(NamedTuple):
     """A phase before its transfers are planned.
 
@@ -235,16 +233,6 @@ def _connections_of(phase: _PhaseDraft) -> Iterator[Connection]:
     yield from phase.connections
     for inner in phase.inner:
         yield from _connections_of(inner)
-
-
-def _split_into_phases(system: System) -> Iterator[_PhaseDraft]:
-    """Yield the phases of the system, in order."""
-    incoming: dict[str, list[Connection]] = defaultdict(list)
-    for connection in system.connections:
-        incoming[connection.target.component].append(connection)
-    yield from _phases_of_stages(
-        system.stages, system.parallel, frozenset(system.components), incoming
-    )
 
 
 def _phases_of_stages(

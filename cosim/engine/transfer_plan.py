@@ -272,12 +272,12 @@ class TransferPlanner:
         offsets = sorted(self._positions(connection)[1].offset for connection in connections)
         runs = [[offsets[0]]]
         for before, after in pairwise(offsets):
-            gap = range(before + 1, after)
+            gap = [ArrayPosition(target_dtype, offset) for offset in range(before + 1, after)]
             if all(
-                self._may_be_read_early(source_dtype, ArrayPosition(target_dtype, offset))
-                for offset in gap
+                (source_dtype, target) in self._copies and target not in self._targets_read
+                for target in gap
             ):
-                runs[-1] += [*gap, after]
+                runs[-1] += range(before + 1, after + 1)
             else:
                 runs.append([after])
         for run in runs:
@@ -289,9 +289,6 @@ class TransferPlanner:
                 ],
                 targets,
             )
-
-    def _may_be_read_early(self, source_dtype: Dtype, target: ArrayPosition) -> bool:
-        return (source_dtype, target) in self._copies and target not in self._targets_read
 
     def _make_transfer(
         self,
