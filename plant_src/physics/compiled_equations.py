@@ -197,29 +197,19 @@ def _cached_library_path(
         raise InputError(
             f'"{fmu}" has no "{member}"; {_rebuilding(model)} on this platform'
         ) from None
-    return _extract_to_cache(content, cache_folder, f"{model}{suffix}")
+    # the name contains a hash of the content, and a damaged file is replaced
+    path = cache_folder / f"{sha256(content).hexdigest()[:20]}-{model}{suffix}"
+    try:
+        is_intact = path.read_bytes() == content
+    except OSError:
+        is_intact = False
+    if not is_intact:
+        with writing_atomically(path) as temporary:
+            temporary.write_bytes(content)
+    return path
 
 
 def _unreadable_fmu_error(model: str, fmu: Path, error: Exception) -> InputError:
     return InputError(
         f'the equations of the vehicle model "{model}" cannot be read from "{fmu}": {error}'
     )
-
-
-def _extract_to_cache(content: bytes, cache_folder: Path, name: str) -> Path:
-    """Write a file to the cache.
-
-    Its name contains a hash of its content, and a damaged file is replaced.
-    """
-    path = cache_folder / f"{sha256(content).hexdigest()[:20]}-{name}"
-    if not _has_content(path, content):
-        with writing_atomically(path) as temporary:
-            temporary.write_bytes(content)
-    return path
-
-
-def _has_content(path: Path, content: bytes) -> bool:
-    try:
-        return path.read_bytes() == content
-    except OSError:
-        return False
