@@ -57,7 +57,13 @@ class CompiledEquations:
     def __init__(self, model: Model):
         self._library = ctypes.PyDLL(str(library_path(model.binary)))
         try:
-            self._refuse_other_variables(model)
+            expected = model.equation_variables_text
+            if interface_hash(expected) != self._text("hash"):
+                here, there = first_difference(expected, self._text("variables"))
+                raise InputError(
+                    f'"{_fmu_path(model.binary)}" was built from other variables: found "{there}", '
+                    f'expected "{here}"; {_rebuilding(model.binary)}'
+                )
             self.functions = read_functions(self._text("functions"))
         except ValueError:
             raise InputError(
@@ -73,15 +79,6 @@ class CompiledEquations:
         """Return an exported text. Raises ValueError if the library has none."""
         address = ctypes.addressof(ctypes.c_char.in_dll(self._library, f"equations_{name}"))
         return ctypes.string_at(address).decode()
-
-    def _refuse_other_variables(self, model: Model) -> None:
-        expected = model.equation_variables_text
-        if interface_hash(expected) != self._text("hash"):
-            here, there = first_difference(expected, self._text("variables"))
-            raise InputError(
-                f'"{_fmu_path(model.binary)}" was built from other variables: found "{there}", '
-                f'expected "{here}"; {_rebuilding(model.binary)}'
-            )
 
     def _refuse_other_sizes(self, model: Model) -> None:
         """Raise InputError if the world divides the variables among the arrays in another way."""
