@@ -7,7 +7,7 @@ Every function takes a result and names of signals or signal prefixes, like the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any, cast
 
@@ -246,7 +246,14 @@ def landing(
     shown = slice(*np.searchsorted(result.time, (start, stop + 1e-9)))
     figure = Figure(figsize=(COLUMN_WIDTH, 3.4), layout="constrained")
     above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
-    for name, line in _altitudes(vehicle, deck, altitude_reference):
+    lines: list[tuple[str, Mapping[str, Any]]] = [
+        (f"{deck}.position.z", {"color": VESSEL_COLOUR, "label": "deck"}),
+        (f"{vehicle}.position.z", {"color": MULTIROTOR_COLOUR, "label": "quadcopter"}),
+    ]
+    if altitude_reference is not None:
+        style = {"color": REFERENCE_COLOUR, "linestyle": "--", "linewidth": 0.9}
+        lines.append((altitude_reference, {**style, "label": "reference"}))
+    for name, line in lines:
         above.plot(result.time[shown], result[name][shown], **line)
     _draw_error(below, result.time[shown], horizontal_distance(result, vehicle, deck)[shown], limit)
     above.set(ylabel="z / m", xlim=(start, max(stop, start + MIN_SPAN)))
@@ -254,22 +261,13 @@ def landing(
     if mode is not None:
         _shade_phases(figure, result.time[shown], result[mode][shown], phases)
     if row is not None:
-        _mark_touchdown(figure, result.time[row], result[f"{vehicle}.position.z"][row])
+        time, altitude = result.time[row], result[f"{vehicle}.position.z"][row]
+        for axes in (above, below):
+            axes.axvline(time, color=TOUCHDOWN_COLOUR, linewidth=0.8, linestyle=":")
+        above.plot(time, altitude, **TOUCHDOWN_MARKER, label="touchdown", zorder=5)
     add_legend(figure, "outside lower center")
     figure.align_ylabels()
     return figure
-
-
-def _altitudes(
-    vehicle: str, deck: str, reference: str | None
-) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    yield f"{deck}.position.z", {"color": VESSEL_COLOUR, "label": "deck"}
-    yield f"{vehicle}.position.z", {"color": MULTIROTOR_COLOUR, "label": "quadcopter"}
-    if reference is not None:
-        yield (
-            reference,
-            {"color": REFERENCE_COLOUR, "label": "reference", "linestyle": "--", "linewidth": 0.9},
-        )
 
 
 def _draw_error(axes: Axes, time: np.ndarray, error: np.ndarray, limit: float | None) -> None:
@@ -321,12 +319,6 @@ def _label_span(axes: Axes, first: float, last: float, name: str) -> None:
     text.set(ha="center", va="bottom", rotation=90 if width < 3.6 * len(name) else 0)
 
 
-def _mark_touchdown(figure: Figure, time: float, altitude: float) -> None:
-    for axes in figure.axes:
-        axes.axvline(time, color=TOUCHDOWN_COLOUR, linewidth=0.8, linestyle=":")
-    figure.axes[0].plot(time, altitude, **TOUCHDOWN_MARKER, label="touchdown", zorder=5)
-
-
 def tracking_error(
     result: Result,
     vehicle: Prefix,
@@ -368,29 +360,21 @@ def tracking_error(
         figure.legend(loc="outside lower right")
     if len(waypoint_x):
         vessel = target.removesuffix(".deck")
-        _mark_turns(
-            axes,
-            waypoints(result, vessel, waypoint_x, waypoint_y, acceptance_radius, waypoint_count),
+        reached = waypoints(
+            result, vessel, waypoint_x, waypoint_y, acceptance_radius, waypoint_count
         )
+        first, last = axes.get_xlim()
+        *times, _ = (time for key, time in reached.items() if key.startswith("time"))
+        for number, time in enumerate(times, start=1):  # no turn follows the last waypoint
+            if first <= time <= last:
+                axes.axvline(time, color=VESSEL_COLOUR, linewidth=0.8, linestyle=":", zorder=1)
+                axes.text(
+                    time,
+                    1.02,
+                    f"turn {number}",
+                    transform=axes.get_xaxis_transform(),
+                    ha="center",
+                    fontsize=6.5,
+                    color=VESSEL_COLOUR,
+                )
     return figure
-
-
-def _mark_turns(axes: Axes, reached: Mapping[str, Any]) -> None:
-    """Draw a numbered line for every waypoint that was reached, except the last.
-
-    No turn follows it.
-    """
-    first, last = axes.get_xlim()
-    *times, _ = (time for key, time in reached.items() if key.startswith("time"))
-    for number, time in enumerate(times, start=1):
-        if first <= time <= last:
-            axes.axvline(time, color=VESSEL_COLOUR, linewidth=0.8, linestyle=":", zorder=1)
-            axes.text(
-                time,
-                1.02,
-                f"turn {number}",
-                transform=axes.get_xaxis_transform(),
-                ha="center",
-                fontsize=6.5,
-                color=VESSEL_COLOUR,
-            )

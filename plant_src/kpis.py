@@ -82,7 +82,14 @@ def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, Number]:
     contact = result[f"{vehicle}.contact.vessel"].astype(bool)
     row = touchdown_row(result, vehicle)
     if row is None:
-        return _values_without_landing(_no_touchdown(result, vehicle))
+        reason = _no_touchdown(result, vehicle)
+        unknown = ("time", "lateral_error", "touchdown_speed", "tangential_speed", "slide")
+        return {
+            **dict.fromkeys(unknown, reason),
+            "bounces": 0,
+            "landed_at_end": False,
+            "final_lateral_error": reason,
+        }
     distance = horizontal_distance(result, vehicle, deck)
     u, v, w = (
         result[f"{vehicle}.velocity.{axis}"] - result[f"{deck}.velocity.{axis}"] for axis in "xyz"
@@ -99,16 +106,6 @@ def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, Number]:
         "final_lateral_error": float(distance[-1])
         if landed
         else NoValue(f"{vehicle} does not touch a vessel at the end"),
-    }
-
-
-def _values_without_landing(reason: NoValue) -> dict[str, Number]:
-    unknown = ("time", "lateral_error", "touchdown_speed", "tangential_speed", "slide")
-    return {
-        **dict.fromkeys(unknown, reason),
-        "bounces": 0,
-        "landed_at_end": False,
-        "final_lateral_error": reason,
     }
 
 

@@ -173,29 +173,24 @@ def turning_circle(
     """
     require(length > 0, f"expected a positive length (m); found {length:g}")
     motion = track(result, vehicle, start, midships)
-    quarter, half = (
-        motion.time_of_heading_change(math.pi / 2),
-        motion.time_of_heading_change(math.pi),
-    )
-    advance, transfer = (
-        motion.interpolate(motion.position, quarter).real,
-        motion.interpolate(motion.position, quarter).imag,
-    )
-    tactical = motion.interpolate(motion.position, half).imag
+    quarter, half = map(motion.time_of_heading_change, (math.pi / 2, math.pi))
+    position = motion.interpolate(motion.position, quarter)
+    tactical = abs(motion.interpolate(motion.position, half).imag)
     period, track_length = _last_full_turn(motion)
     speed = track_length / period
+    u, v = (np.interp(start, result.time, result[f"{vehicle}.velocity.{axis}"]) for axis in "xy")
     return {
-        "advance": advance,
-        "transfer": abs(transfer),
-        "tactical_diameter": abs(tactical),
+        "advance": position.real,
+        "transfer": abs(position.imag),
+        "tactical_diameter": tactical,
         "steady_diameter": track_length / math.pi,
-        "advance_lengths": advance / length,
-        "tactical_diameter_lengths": abs(tactical) / length,
+        "advance_lengths": position.real / length,
+        "tactical_diameter_lengths": tactical / length,
         "time_to_90": quarter - start,
         "time_to_180": half - start,
         "period": period,
         "steady_speed": speed,
-        "speed_loss": 1 - speed / _speed_over_ground(result, vehicle, start),
+        "speed_loss": 1 - speed / math.hypot(u, v),
     }
 
 
@@ -208,12 +203,6 @@ def _last_full_turn(motion: Track) -> tuple[float, float]:
     return float(motion.time[-1]) - begin, float(motion.distance[-1]) - motion.interpolate(
         motion.distance, begin
     ).real
-
-
-def _speed_over_ground(result: Result, vehicle: str, time: float) -> float:
-    """Return the speed over ground (m/s) at `time` (s)."""
-    u, v = (np.interp(time, result.time, result[f"{vehicle}.velocity.{axis}"]) for axis in "xy")
-    return math.hypot(u, v)
 
 
 @better(overshoot="lower", initial_turning_time="lower", reach="lower")
@@ -279,12 +268,8 @@ def _reversals(motion: Track, angle: float, count: int) -> tuple[list[float], li
         following = first_crossing_time(
             motion.time[rows], -side * motion.heading_change[rows], angle
         )
-        swing = (
-            side
-            * motion.heading_change[rows][
-                motion.time[rows] <= (following if math.isfinite(following) else math.inf)
-            ]
-        )
+        # no time is later than NaN: without a next reversal, all rows are part of the swing
+        swing = side * motion.heading_change[rows][~(motion.time[rows] > following)]
         is_returning = swing.size > 0 and swing[-1] < swing.max()
         times.append(reversal)
         overshoots.append(float(swing.max()) - angle if is_returning else math.nan)
@@ -380,10 +365,8 @@ def stopping(
     motion = track(result, vehicle, start, midships)
     forward = np.interp(motion.time, result.time, result[f"{vehicle}.velocity_body.u"])
     time = first_crossing_time(motion.time, -forward, -speed)
-    position, reach = (
-        motion.interpolate(motion.position, time),
-        motion.interpolate(motion.distance, time).real,
-    )
+    position = motion.interpolate(motion.position, time)
+    reach = motion.interpolate(motion.distance, time).real
     return {
         "track_reach": reach,
         "track_reach_lengths": reach / length,

@@ -95,6 +95,7 @@ def test_json_examples_satisfy_the_schema(text):
 def schema(example):
     """The schema of what an example is."""
     from cosim.scenario.extension_schema import editor_schema
+    from cosim.scenario.schema_types import schema_of
     from cosim.studies import schema as sweeps
 
     for key, kind in (
@@ -103,7 +104,7 @@ def schema(example):
         ("keep", sweeps.WorstCaseSpec),
     ):
         if key in example:
-            return sweeps.study_json_schema(kind)
+            return schema_of(kind)
     return editor_schema(nested="ports" in example)
 
 

@@ -276,26 +276,24 @@ class Experiment:
 
         Each has what follows the name in that of the input.
         """
-        fed = {connection.target for connection in self.prepared.system.connections}
+        connections = self.prepared.system.connections
+        fed = {connection.target for connection in connections}
         targets = []
         for component, prefix in self._resolve(text):
             for causality in ("input", "parameter"):
-                for suffix, slot in (
-                    SlotIndex(self.prepared.system.components[component], causality)
-                    .below(prefix)
-                    .items()
-                ):
+                index = SlotIndex(self.prepared.system.components[component], causality)
+                for suffix, slot in index.below(prefix).items():
                     endpoint = Endpoint(component, slot)
                     if endpoint in fed or not not_settable_reason(
                         component, self._variable(endpoint), fed
                     ):
                         targets.append((suffix, PerturbationTarget(endpoint)))
-            for suffix, slot in (
-                SlotIndex(self.prepared.system.components[component], "output")
-                .below(prefix)
-                .items()
-            ):
-                targets += [(suffix, each) for each in self.targets_of(Endpoint(component, slot))]
+            index = SlotIndex(self.prepared.system.components[component], "output")
+            for suffix, slot in index.below(prefix).items():
+                source = Endpoint(component, slot)
+                targets += [
+                    (suffix, self.target_of(each)) for each in connections if each.source == source
+                ]
         return [
             (suffix, target)
             for suffix, target in targets
@@ -313,14 +311,6 @@ class Experiment:
         if not found:
             raise InputError(f'inputs: no variable "{text}": {problems[0]}')
         return list(dict.fromkeys(found))
-
-    def targets_of(self, source: Endpoint) -> list[PerturbationTarget]:
-        """Return the inputs that an output feeds, with the factors of their units and gains."""
-        return [
-            self.target_of(each)
-            for each in self.prepared.system.connections
-            if each.source == source
-        ]
 
     def target_of(self, connection: Connection) -> PerturbationTarget:
         """Return the input of a connection, with the factor of its unit and gain."""

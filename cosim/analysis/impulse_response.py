@@ -54,9 +54,16 @@ def realize(
     # The Hankel matrix of a linear system is the product of what the outputs show of a state and of
     # how the inputs reach it. A singular value decomposition splits it into both factors; the
     # number of kept singular values is the order. The matrix shifted by one sample gives A.
-    rows, columns = _scales(response)
+    # The largest scaled responses of outputs and inputs are about 1.
+    peaks = np.abs(response).max(0)
+    rows = peaks.max(1)
+    rows[rows == 0] = 1
+    columns = (peaks / rows[:, None]).max(0)
+    columns[columns == 0] = 1
     scaled = response / rows[:, None] / columns
-    lags = _lags(len(response))
+    # Two lags together and 2 more are less than the number of samples.
+    lags = np.unique(np.round(1.35 ** np.arange(0, 60)).astype(int) - 1)
+    lags = lags[lags <= max(0, (len(response) - 3) // 2)]
     now, later = _hankel(scaled[1:], lags), _hankel(scaled[2:], lags)
     left, singular, right = np.linalg.svd(now, full_matrices=False)
     outputs, inputs = response.shape[1:]
@@ -91,23 +98,6 @@ def misfit(realization: Realization, response: np.ndarray) -> float:
     with np.errstate(over="ignore", invalid="ignore"):
         errors = np.abs(realization.impulse_response(len(response)) - response) / peaks
     return float(np.max(np.nan_to_num(errors, nan=np.inf), initial=0))
-
-
-def _scales(response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return factors of outputs and inputs that make the largest responses about 1."""
-    peaks = np.abs(response).max(0)
-    rows = peaks.max(1)
-    rows[rows == 0] = 1
-    columns = (peaks / rows[:, None]).max(0)
-    columns[columns == 0] = 1
-    return rows, columns
-
-
-def _lags(count: int) -> np.ndarray:
-    """Return increasing lags from 0, of which two together and 2 more are less than `count`."""
-    largest = max(0, (count - 3) // 2)
-    lags = np.unique(np.round(1.35 ** np.arange(0, 60)).astype(int) - 1)
-    return np.asarray(lags[lags <= largest])
 
 
 def _hankel(response: np.ndarray, lags: np.ndarray) -> np.ndarray:

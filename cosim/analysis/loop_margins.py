@@ -153,9 +153,8 @@ def _gain_margins(
         *_crossings(frequencies, values.imag, lambda frequency: at(frequency).imag),
         float(frequencies[-1]),
     ]
-    for (
-        frequency
-    ) in points:  # at the last frequency, half of the sampling rate, the response is real
+    # at the last frequency, half of the sampling rate, the response is real
+    for frequency in points:
         real = at(frequency).real
         if -1 < real < 0 and -1 / real < gain:
             gain, found = -1 / real, frequency

@@ -7,14 +7,13 @@ sign of negative feedback.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
 from ..core.errors import InputError, did_you_mean
-from ..core.system import Endpoint
 from ..engine.perturbation import PerturbationTarget
 from .experiment import Experiment, Scenario
 from .impulse_response import (
@@ -105,12 +104,9 @@ def find_loops(
         )
         if is_real and (source.component in inside) != (target.component in inside):
             channels = published if source.component in inside else read
-            channels.setdefault(_name(source, names), []).append(experiment.target_of(connection))
+            name = names.get(source, str(source))
+            channels.setdefault(name, []).append(experiment.target_of(connection))
     return {**read, **published}
-
-
-def _name(endpoint: Endpoint, aliases: Mapping[Endpoint, str]) -> str:
-    return aliases.get(endpoint, str(endpoint))
 
 
 def choose_loops(
@@ -270,9 +266,7 @@ def estimate_loop(
             raise InputError(f'loops: "{loop}" names {len(chosen)} signals, expected one')
         experiment.choose(chosen, [])
         samples = round(period / experiment.step)
-        make: Callable[..., tuple[np.ndarray, np.ndarray, slice]] = (
-            _sines if excitation == "sines" else _chirp
-        )
+        make = _sines if excitation == "sines" else _chirp
         used, added, window = make(wanted, samples, experiment.step, amplitude)
         excited, free = (
             experiment.respond(values[:, None]).observed[:, 0]

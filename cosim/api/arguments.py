@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, get_args
 
 from ..core.errors import InputError, Problem, did_you_mean
@@ -25,12 +25,8 @@ def expect(name: str, value: Any, accepted: bool, description: str) -> None:
         InputError: The value is not accepted.
     """
     if not accepted:
-        raise InputError(
-            Problem(
-                f"expected {description}; found {shorten(repr(value))} ({type(value).__name__})",
-                name,
-            )
-        )
+        found = f"{shorten(repr(value))} ({type(value).__name__})"
+        raise InputError(Problem(f"expected {description}; found {found}", name))
 
 
 def check_names(name: str, value: Any) -> None:
@@ -54,18 +50,11 @@ def check_load_arguments(scenario: Any, parameters: Any, options: Mapping[str, A
     expect("scenario", scenario, isinstance(scenario, str | os.PathLike | Mapping), text)
     check_names("parameters", parameters)
     for name in ("stop_time", "step_size"):
-        expect(
-            name,
-            options[name],
-            _is_optional(options[name], _is_number_or_text),
-            "seconds as a number or a text",
-        )
-    expect(
-        "real_time",
-        options["real_time"],
-        _is_optional(options["real_time"], is_number),
-        "a number or None",
-    )
+        time = options[name]
+        is_time = time is None or isinstance(time, str) or is_number(time)
+        expect(name, time, is_time, "seconds as a number or a text")
+    ratio = options["real_time"]
+    expect("real_time", ratio, ratio is None or is_number(ratio), "a number or None")
     for name, literal in (("late", LatePolicy), ("isolation", IsolationMode)):
         valid = get_args(literal)
         expect(name, options[name], options[name] in valid, f"one of {', '.join(map(repr, valid))}")
@@ -80,11 +69,3 @@ def is_integer(value: Any) -> bool:
 def is_number(value: Any) -> bool:
     """Return whether a value is a number of Python or NumPy, and no Boolean."""
     return hasattr(value, "__float__") and not isinstance(value, bool | str)
-
-
-def _is_number_or_text(value: Any) -> bool:
-    return isinstance(value, str) or is_number(value)
-
-
-def _is_optional(value: Any, is_valid: Callable[[Any], bool]) -> bool:
-    return value is None or is_valid(value)

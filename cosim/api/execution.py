@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
 
 from ..core.errors import CosimError, InputError, Problem
-from ..engine import Termination
 from ..engine.plan_run import SimulationOutcome
 from ..process.float_mode import default_float_mode
 from ..results import Kpis, Result, RunMetadata
@@ -74,10 +72,16 @@ def _evaluate_run(result: Result, prepared: PreparedRun) -> Result:
     )
     checks = evaluate_all_checks(kpis, prepared.checks)
     failed = [check.check["kpi"] for check in checks if not check.passed]
+    # a signal may have another meaning in a user's component
+    signals: dict[str, dict[str, str]] = {}
+    for name, _, arguments in functions:
+        if name in prepared.optional_kpis:
+            texts = {key: each for key, each in arguments.items() if isinstance(each, str)}
+            signals[name] = {key: text for key, text in texts.items() if text in result}
     about: RunMetadata = {
         "kpi_units": kpi_units(functions, kpis, result.units),
         "kpi_senses": kpi_senses(functions, kpis),
-        "kpi_notes": kpi_notes(values, _signals_of_optional_kpis(prepared, functions, result)),
+        "kpi_notes": kpi_notes(values, signals.items()),
         "check_notes": kpi_notes({name: values[name] for name in failed if name in values}),
     }
     return replace(
@@ -87,23 +91,6 @@ def _evaluate_run(result: Result, prepared: PreparedRun) -> Result:
         checks=checks,
         failure=failures[0] if failures else None,
     )
-
-
-def _signals_of_optional_kpis(
-    prepared: PreparedRun, functions: Iterable[tuple[str, Any, Mapping[str, Any]]], result: Result
-) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield the name of each optional KPI, and its signals by argument.
-
-    A signal may have another meaning in a user's component.
-    """
-    for name, _, arguments in functions:
-        signals = {
-            key: value
-            for key, value in arguments.items()
-            if isinstance(value, str) and value in result
-        }
-        if signals and name in prepared.optional_kpis:
-            yield name, signals
 
 
 def evaluate_scenario_checks(prepared: PreparedRun, result: Result) -> list[CheckOutcome]:
@@ -150,17 +137,15 @@ def _outcome_metadata(prepared: PreparedRun, outcome: SimulationOutcome) -> RunM
     interrupted = isinstance(failure, KeyboardInterrupt)
     text = "interrupted" if interrupted else str(failure) or type(failure).__name__
     allows_all = prepared.spec.non_finite == "allow"
+    termination, ended = outcome.termination, None
+    if termination and termination.condition:
+        ended = termination.condition._asdict()
+    elif termination:
+        ended = {"component": termination.component, "time": termination.time}
     return {
         "macro_steps": outcome.macro_steps,
         "real_time": outcome.real_time,
         "non_finite": {} if allows_all else warn_non_finite(outcome.recording),
-        "terminated_by": outcome.termination and _describe_termination(outcome.termination),
+        "terminated_by": ended,
         "failure": text if failure else None,
     }
-
-
-def _describe_termination(termination: Termination) -> dict[str, Any]:
-    """Return the component or the condition that ended the run before the stop time."""
-    if termination.condition:
-        return termination.condition._asdict()
-    return {"component": termination.component, "time": termination.time}

@@ -78,7 +78,9 @@ class VariableAccess:
         if known and known.accepts(value):
             run.set_in_next_step(known.component, known.values(value))
             return
-        for target in self._find_targets(name):
+        if name not in self._targets:
+            self._targets[name] = self._resolve(name, ("parameters", "inputs"))
+        for target in self._targets[name]:
             component, variables = target.component, self._variables_of(target.component)
             read = self._system.components[component].get
             try:
@@ -87,9 +89,9 @@ class VariableAccess:
                 raise InputError(Problem(str(error), f'set("{name}")')) from None
             for variable in values:
                 if reason := not_settable_reason(component, variables[variable], self._connected):
-                    hint = "; load() and reset() take start values as `parameters`"
                     text = f"{reason}, it cannot be set during the simulation"
-                    text += "" if "connection" in reason else hint
+                    if "connection" not in reason:
+                        text += "; load() and reset() take start values as `parameters`"
                     raise InputError(Problem(text, f'set("{name}")'))
             run.set_in_next_step(component, values)
             if len(self._targets[name]) == 1 and isinstance(value, list):
@@ -114,12 +116,6 @@ class VariableAccess:
                 variable.name: variable for variable in self._system.components[component].variables
             }
         return self._variables[component]
-
-    def _find_targets(self, name: str) -> list[Target]:
-        """Return the variables that an assignment sets."""
-        if name not in self._targets:
-            self._targets[name] = self._resolve(name, ("parameters", "inputs"))
-        return self._targets[name]
 
     def _resolve(self, name: str, ports: tuple[str, ...]) -> list[Target]:
         try:

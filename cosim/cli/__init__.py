@@ -163,35 +163,32 @@ def main(arguments: list[str] | None = None) -> None:
         arguments: words after the program's name; default: those of this process.
     """
     if arguments is None:
-        _raise_collection_threshold()
+        # almost all objects of a command exist until its process ends
+        gc.set_threshold(_GC_THRESHOLD)
+        atexit.register(gc.freeze)
+        arguments = sys.argv[1:]
     open_closed_streams()
     sys.stdout, sys.stderr = protected_stream(sys.stdout), protected_stream(sys.stderr)
-    sys.exit(_run_command_line(sys.argv[1:] if arguments is None else arguments))
+    sys.exit(run_command_line(arguments))
 
 
-def _raise_collection_threshold() -> None:
-    """Let the cycle collector run rarely.
-
-    Almost all objects of a command exist until its process ends.
-    """
-    gc.set_threshold(_GC_THRESHOLD)
-    atexit.register(gc.freeze)
-
-
-def _run_command_line(arguments: list[str]) -> int:
+def run_command_line(arguments: list[str]) -> int:
+    """Run the command `cosim` in this process and return its exit code."""
     command_line = CommandLine(tuple(arguments))
     return run_guarded(
-        lambda: _exit_code(
-            cli.main(arguments, prog_name="cosim", standalone_mode=False, obj=command_line)
-        ),
+        lambda: cli.main(arguments, prog_name="cosim", standalone_mode=False, obj=command_line),
         command_line,
     )
 
 
-def run_guarded(command: Callable[[], int], command_line: CommandLine) -> int:
-    """Call `command` and return its exit code; report whatever it raises to the user."""
+def run_guarded(command: Callable[[], Any], command_line: CommandLine) -> int:
+    """Call `command` and return its exit code, 0 if it returns none.
+
+    Report whatever it raises to the user.
+    """
     try:
-        return command()
+        code = command()
+        return code if isinstance(code, int) else 0
     except (Exception, KeyboardInterrupt) as error:
         return report_error(error, command_line)
 
@@ -228,7 +225,3 @@ def exit_code_of(error: BaseException) -> int:
     if isinstance(error, click.ClickException | CosimError):
         return error.exit_code
     return 1 if isinstance(error, OSError | MemoryError) else 70
-
-
-def _exit_code(value: Any) -> int:
-    return value if isinstance(value, int) else 0

@@ -49,15 +49,8 @@ class BenchProgress:
             per_controller = (time.perf_counter() - self._began) / self._finished
             seconds = per_controller * (self._count - self._finished)
             rest = f", about {format_duration(seconds)} left"
-        self._print(f"{name} (controller {self._finished + 1} of {self._count}{rest})")
-
-    def print_costs(self) -> None:
-        """Print that the costs are measured now."""
-        self._print("measuring the processor time per step")
-
-    def _print(self, text: str) -> None:
         if not self._quiet:
-            click.echo(text)
+            click.echo(f"{name} (controller {self._finished + 1} of {self._count}{rest})")
 
 
 def print_trial(result: TrialResult, candidate: str) -> None:
@@ -184,8 +177,14 @@ def _print_comparison(rows: Sequence[KpiComparison], candidate: str) -> None:
         rows: the KPIs; without any, nothing is printed.
         candidate: name of the candidate.
     """
+    from rich.text import Text
+
     if not rows:
         return
+
+    def verdict_cell(verdict: str) -> Text:
+        return Text(verdict, style={"better": "green", "worse": "red"}.get(verdict, ""))
+
     with_last = any(row.last is not None for row in rows)
     with_checks = any(row.checks for row in rows)
     header = ["KPI", "unit", candidate, OWN_CONTROLLER, ""]
@@ -195,28 +194,17 @@ def _print_comparison(rows: Sequence[KpiComparison], candidate: str) -> None:
     for row in rows:
         cells: list[str | Text] = [row.name, row.unit]
         cells += [_format_value(row.candidate), _format_value(row.shipped)]
-        cells.append(_colour_verdict(row.against_shipped))
-        cells += [_format_value(row.last), _colour_verdict(row.against_last)] if with_last else []
-        cells += [_format_checks(row)] if with_checks else []
+        cells.append(verdict_cell(row.against_shipped))
+        cells += [_format_value(row.last), verdict_cell(row.against_last)] if with_last else []
+        if with_checks:
+            checks = []
+            for outcome in row.checks:
+                word, style = ("passed", "green") if outcome.passed else ("failed", "bold red")
+                checks.append(Text(f"{outcome.limits} {word}", style=style))
+            cells.append(Text(", ").join(checks))
         table.append(cells)
     print_table(header, table, right=(candidate, OWN_CONTROLLER, "last run"))
 
 
 def _format_value(value: Number | None) -> str:
     return "" if value is None else format_number(value)
-
-
-def _colour_verdict(verdict: str) -> Text:
-    from rich.text import Text
-
-    return Text(verdict, style={"better": "green", "worse": "red"}.get(verdict, ""))
-
-
-def _format_checks(row: KpiComparison) -> Text:
-    from rich.text import Text
-
-    checks = []
-    for outcome in row.checks:
-        word, style = ("passed", "green") if outcome.passed else ("failed", "bold red")
-        checks.append(Text(f"{outcome.limits} {word}", style=style))
-    return Text(", ").join(checks)

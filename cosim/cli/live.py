@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from . import supervision
+from .options import flag_option, options
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -21,28 +22,23 @@ if TYPE_CHECKING:
 #: it can be seen
 _DEFAULT_SPEED = 1.0
 
-_view = click.option(
-    "--view",
-    is_flag=True,
-    help=(
-        "Show the run live in a browser on this machine: pause, step, set the speed, tunable "
-        "parameters and unconnected inputs. Starts in real time, or with the FACTOR of --real-time."
+view_options = options(
+    flag_option(
+        "--view",
+        help=(
+            "Show the run live in a browser on this machine: pause, step, set the speed, tunable "
+            "parameters and unconnected inputs. Starts in real time, or with the FACTOR of "
+            "--real-time."
+        ),
+    ),
+    flag_option("--wait", help="With --view: begin when the live page has been opened."),
+    click.option(
+        "--view-port",
+        type=click.IntRange(0, 65535),
+        default=0,
+        help="Port of the live page; default: any free port.",
     ),
 )
-_port = click.option(
-    "--view-port",
-    type=click.IntRange(0, 65535),
-    default=0,
-    help="Port of the live page; default: any free port.",
-)
-_wait = click.option(
-    "--wait", is_flag=True, help="With --view: begin when the live page has been opened."
-)
-
-
-def view_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options `--view`, `--wait` and `--view-port` to a command."""
-    return _view(_wait(_port(command)))
 
 
 def check_view_options(isolation: str, sandbox: str | None, late: str) -> None:
@@ -106,13 +102,12 @@ def create_control(prepared: PreparedRun, link: Connection, speed: float | None)
     from ..report.live.control import LiveControl
     from ..report.scene import build_scene
 
-    plan, value = prepared.plan, prepared.document.value
+    plan, document = prepared.plan, prepared.document
+    metadata = {"scenario": document.value, "scenario_file": str(document.file.resolve())}
     about = {
         "name": prepared.spec.name,
         "description": prepared.spec.description,
-        "scene": build_scene(
-            {"scenario": value, "scenario_file": str(prepared.document.file.resolve())}
-        ),
+        "scene": build_scene(metadata),
         "rows": plan.row_count,
         "stop_time": float(plan.settings.stop_time),
     }

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
 from ..core import resources
+from ..core.errors import InputError, Problem
 from ..process.standard_streams import protected_stream
 from . import CommandLine
 
@@ -19,8 +20,31 @@ if TYPE_CHECKING:
 
 #: type of options that are paths
 PATH = click.Path(path_type=Path)
+#: values of an option that may be repeated
+Texts = tuple[str, ...]
 #: decorator that adds options to a command
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+
+def options(*decorators: Decorator) -> Decorator:
+    """Return a decorator that adds several options to a command."""
+
+    def add_options(command: Callable[..., Any]) -> Callable[..., Any]:
+        for decorate in reversed(decorators):
+            command = decorate(command)
+        return command
+
+    return add_options
+
+
+def flag_option(*names: str, **settings: Any) -> Decorator:
+    """Return a decorator that adds an option without a value to a command."""
+    return click.option(*names, is_flag=True, **settings)
+
+
+def path_option(*names: str, **settings: Any) -> Decorator:
+    """Return a decorator that adds an option whose value is a path to a command."""
+    return click.option(*names, type=PATH, **settings)
 
 
 def complete_shipped(
@@ -53,9 +77,8 @@ scenario_argument = click.argument("scenario", shell_complete=complete_scenario)
 settings_option = click.option(
     "--set", "settings", multiple=True, metavar="NAME=value", help="As for `cosim run`."
 )
-output_dir_option = click.option(
+output_dir_option = path_option(
     "--output-dir",
-    type=PATH,
     help="Folder for the results; default: runs/NAME.",
 )
 jobs_option = click.option(
@@ -63,9 +86,7 @@ jobs_option = click.option(
     type=click.IntRange(min=1),
     help="Number of scenarios at a time; default: one per processor.",
 )
-page_option = click.option(
-    "--open", "open_page", is_flag=True, help="Open the page in the browser."
-)
+page_option = flag_option("--open", "open_page", help="Open the page in the browser.")
 
 
 def new_file_options(result: str = "file") -> Decorator:
@@ -75,12 +96,17 @@ def new_file_options(result: str = "file") -> Decorator:
         "folder": ("Parent of the folder NAME; default: the working directory.", "existing files"),
     }
     where, what = help_texts[result]
+    return options(
+        path_option("--directory", default=Path(), help=where),
+        flag_option("--force", help=f"Overwrite {what}."),
+    )
 
-    def add_options(command: Callable[..., Any]) -> Callable[..., Any]:
-        force = click.option("--force", is_flag=True, help=f"Overwrite {what}.")
-        return click.option("--directory", type=PATH, default=Path(), help=where)(force(command))
 
-    return add_options
+def refuse_existing(paths: Iterable[Path], force: bool) -> None:
+    """Raise InputError if files exist and `--force` is not given."""
+    present = [str(path) for path in paths if path.exists()]
+    if present and not force:
+        raise InputError([Problem("exists; --force overwrites it", path) for path in present])
 
 
 def _set_excel_safe(_context: click.Context, _option: click.Parameter, enabled: bool) -> None:
@@ -91,9 +117,8 @@ def _set_excel_safe(_context: click.Context, _option: click.Parameter, enabled: 
 
 
 #: option of commands that write CSV files
-csv_option = click.option(
+csv_option = flag_option(
     "--excel-safe",
-    is_flag=True,
     expose_value=False,
     callback=_set_excel_safe,
     help=(
@@ -109,10 +134,9 @@ def json_option(content: str) -> Decorator:
     Args:
         content: the JSON value in words, for the help text.
     """
-    return click.option(
+    return flag_option(
         "--json",
         "as_json",
-        is_flag=True,
         callback=_prepare_json,
         help=f"Print only JSON: {content}.",
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -94,20 +94,30 @@ class RunOutcome:
 
 def write_outputs(outcome: RunOutcome) -> int:
     """Write, print and draw all outputs of a run, and return the exit code of the command."""
-    if failure := outcome.result.failure:
+    result, options = outcome.result, outcome.options
+    if failure := result.failure:
         code = _end_failed_run(outcome, failure)
     else:
-        for write in _COMPLETE_RUN_WRITERS:
-            write(outcome)
-        passed = not outcome.result.crashed and all(check.passed for check in outcome.checks)
+        _write_result_files(outcome)
+        if not options.as_json:
+            _print_kpis(outcome)
+        if not options.no_report:
+            _write_report(outcome)
+        if not options.as_json:
+            _print_summary(outcome)
+        passed = not result.crashed and all(check.passed for check in outcome.checks)
         code = 0 if passed else 3
-    for write in _EVERY_RUN_WRITERS:
-        write(outcome)
-    if outcome.options.as_json and not failure:
+    if result.termination and not options.as_json:
+        click.echo(result.termination)
+    if options.parquet:
+        result.to_parquet(outcome.folder / "result.parquet")
+    if options.mcap:
+        from ..report.scene import build_scene
+
+        result.to_mcap(outcome.folder / "result.mcap", build_scene(result.metadata))
+    if options.as_json and not failure:
         print_json(
-            _summarize_run(
-                outcome.result, outcome.checks, outcome.shown_folder, outcome.files, code
-            )
+            _summarize_run(result, outcome.checks, outcome.shown_folder, outcome.files, code)
         )
     return code
 
@@ -215,8 +225,6 @@ def _write_result_files(outcome: RunOutcome) -> None:
 
 def _print_kpis(outcome: RunOutcome) -> None:
     """Print the table of KPIs; with --quiet, print only the failed checks."""
-    if outcome.options.as_json:
-        return
     if current_command_line().verbosity < 0:
         for check in outcome.checks:
             if not check.passed:
@@ -229,8 +237,6 @@ def _print_kpis(outcome: RunOutcome) -> None:
 
 def _write_report(outcome: RunOutcome) -> None:
     """Write the figures and the report that shows them."""
-    if outcome.options.no_report:
-        return
     from ..report.run_page import write_report
 
     write_report(
@@ -254,8 +260,6 @@ def _write_figures(outcome: RunOutcome) -> Iterator[tuple[str, str]]:
 
 
 def _print_summary(outcome: RunOutcome) -> None:
-    if outcome.options.as_json:
-        return
     result = outcome.result
     loop, simulated = result.timing["loop_seconds"], float(result.time[-1] - result.time[0])
     seconds = time.perf_counter() - outcome.began
@@ -266,7 +270,11 @@ def _print_summary(outcome: RunOutcome) -> None:
     )
     click.echo(f"{', '.join(outcome.files)} in {outcome.shown_folder} ({seconds:.1f} s in all)")
     if pacing := result.metadata["real_time"]:
-        click.echo(_format_pacing(pacing))
+        lateness = ", ".join(
+            f"{label} {1e3 * pacing[key]:.3g} ms" for label, key in _LATENESS_LABELS.items()
+        )
+        late = f"{pacing['late_steps']} of {count_noun(pacing['steps'], 'step')} late"
+        click.echo(f"paced to {pacing['factor']:g} times real time: {late}; lateness {lateness}")
     if events := result.metadata.get("live_events"):
         times = count_noun(len(events), "time")
         click.echo(
@@ -290,31 +298,6 @@ def _summarize_checks(checks: Sequence[CheckOutcome], units: Mapping[str, str]) 
     return (
         f"{passed} of {count_noun(len(checks), 'check')} passed{failed and ', failed:'}{failed}\n"
     )
-
-
-def _print_termination(outcome: RunOutcome) -> None:
-    if outcome.result.termination and not outcome.options.as_json:
-        click.echo(outcome.result.termination)
-
-
-def _format_pacing(pacing: Mapping[str, Any]) -> str:
-    lateness = ", ".join(
-        f"{label} {1e3 * pacing[key]:.3g} ms" for label, key in _LATENESS_LABELS.items()
-    )
-    late = f"{pacing['late_steps']} of {count_noun(pacing['steps'], 'step')} late"
-    return f"paced to {pacing['factor']:g} times real time: {late}; lateness {lateness}"
-
-
-def _write_parquet(outcome: RunOutcome) -> None:
-    if outcome.options.parquet:
-        outcome.result.to_parquet(outcome.folder / "result.parquet")
-
-
-def _write_mcap(outcome: RunOutcome) -> None:
-    if outcome.options.mcap:
-        from ..report.scene import build_scene
-
-        outcome.result.to_mcap(outcome.folder / "result.mcap", build_scene(outcome.result.metadata))
 
 
 def _summarize_run(
@@ -350,18 +333,3 @@ def _summarize_run(
         "folder": folder,
         "files": files,
     }
-
-
-#: outputs of a run that reached its end, in this order
-_COMPLETE_RUN_WRITERS: Sequence[Callable[[RunOutcome], None]] = (
-    _write_result_files,
-    _print_kpis,
-    _write_report,
-    _print_summary,
-)
-#: outputs of every run, also of one that failed
-_EVERY_RUN_WRITERS: Sequence[Callable[[RunOutcome], None]] = (
-    _print_termination,
-    _write_parquet,
-    _write_mcap,
-)

@@ -151,12 +151,8 @@ def group_scenarios(entries: Iterable[Entry]) -> dict[str, list[Entry]]:
     """Return the scenarios by the headings of their groups; empty groups are left out."""
     found: dict[str, list[Entry]] = {heading: [] for heading in SCENARIO_GROUPS}
     for entry in entries:
-        found[_heading(entry.name)].append(entry)
+        for heading, patterns in SCENARIO_GROUPS.items():
+            if any(fnmatchcase(entry.name, pattern) for pattern in patterns):
+                found[heading].append(entry)
+                break
     return {heading: group for heading, group in found.items() if group}
-
-
-def _heading(name: str) -> str:
-    for heading, patterns in SCENARIO_GROUPS.items():
-        if any(fnmatchcase(name, pattern) for pattern in patterns):
-            return heading
-    raise LookupError(name)  # not reached: "*" matches every name

@@ -60,13 +60,11 @@ class SandboxCommand(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the arguments after adding the default value to a bare `--sandbox`."""
-        return super().parse_args(ctx, list(_with_explicit_kind(args)))
-
-
-def _with_explicit_kind(words: list[str]) -> Iterator[str]:
-    for word, following in zip_longest(words, words[1:]):
-        is_bare = word == "--sandbox" and following not in SANDBOX_KINDS
-        yield f"--sandbox={SANDBOX_KINDS[0]}" if is_bare else word
+        words = []
+        for word, following in zip_longest(args, args[1:]):
+            is_bare = word == "--sandbox" and following not in SANDBOX_KINDS
+            words.append(f"--sandbox={SANDBOX_KINDS[0]}" if is_bare else word)
+        return super().parse_args(ctx, words)
 
 
 def must_rerun(sandbox: str | None) -> bool:
@@ -86,13 +84,18 @@ def rerun_in_bubblewrap(files: Iterable[Path], output: Path | None) -> int:
         InputError: if bubblewrap is missing or cannot start the command, or a folder contains the
             home folder.
     """
+    from ..core import resources
     from ..core.errors import InputError
-    from ..process.sandbox import KEPT_VARIABLES, bubblewrap_command
+    from ..process.sandbox import KEPT_VARIABLES, bubblewrap_command, interpreter_folders
     from ..process.supervisor import interrupt_on_termination
     from ..process.temporary_folders import temporary_run_folder
 
-    folders = _named_folders(files)
-    _refuse_home_folder([*folders, *([output] if output else [])])
+    named: list[Path] = []
+    for file in files:  # also the folder of the target of a link
+        named += [file.absolute().parent, file.resolve().parent]
+    folders = [folder for folder in named if folder.exists()]
+    outputs = [output] if output else []
+    _refuse_home_folder([*folders, *outputs])
     with ExitStack() as stack:
         temporary = Path(stack.enter_context(temporary_run_folder()))
         stack.enter_context(interrupt_on_termination())
@@ -100,9 +103,10 @@ def rerun_in_bubblewrap(files: Iterable[Path], output: Path | None) -> int:
         status = stack.enter_context(os.fdopen(reader))
         with os.fdopen(writer):
             python = [sys.executable, "-P", "-m", "cosim", *current_command_line().arguments]
-            writable = [temporary, *([output] if output else [])]
+            installed = [*interpreter_folders(), *map(Path, _SYSTEM_PATHS), resources.root()]
+            readable = [path for path in installed if path.exists()]
             words = bubblewrap_command(
-                python, [*_readable_folders(), *folders], writable, status=writer
+                python, [*readable, *folders], [temporary, *outputs], status=writer
             )
             if output:
                 stack.enter_context(_output_folder(output))
@@ -123,14 +127,6 @@ def rerun_in_bubblewrap(files: Iterable[Path], output: Path | None) -> int:
     if "exit-code" not in report:
         raise InputError(f"bubblewrap could not start the command (exit code {process.returncode})")
     return int(report["exit-code"])
-
-
-def _named_folders(files: Iterable[Path]) -> list[Path]:
-    """Return the existing folders of the files, also of link targets."""
-    folders: list[Path] = []
-    for file in files:
-        folders += [file.absolute().parent, file.resolve().parent]
-    return [folder for folder in folders if folder.exists()]
 
 
 def _refuse_home_folder(folders: Iterable[Path]) -> None:
@@ -178,15 +174,3 @@ def _wait_for_exit(process: subprocess.Popen[bytes], status: IO[str]) -> dict[st
         except KeyboardInterrupt:
             with suppress(ProcessLookupError):
                 os.kill(report.get("child-pid", process.pid), SIGINT)
-
-
-def _readable_folders() -> list[Path]:
-    """Return the existing folders of Python, of the system and of cosim."""
-    from ..core import resources
-    from ..process.sandbox import interpreter_folders
-
-    return [
-        path
-        for path in (*interpreter_folders(), *map(Path, _SYSTEM_PATHS), resources.root())
-        if path.exists()
-    ]

@@ -18,7 +18,7 @@ from ..core.resources import available_processors
 from ..core.size_limits import MAX_RUNS
 from ..core.text import count_noun
 from . import current_command_line
-from .options import csv_option
+from .options import csv_option, flag_option, options
 
 if TYPE_CHECKING:
     from ..studies.execution.job import Record
@@ -28,34 +28,32 @@ if TYPE_CHECKING:
 #: time between two lines of progress without a terminal (s)
 _LINE_INTERVAL = 30.0
 
-_workers = click.option(
-    "--workers",
-    type=click.IntRange(min=1),
-    help="Number of runs at a time on this machine; default: one per processor.",
-)
-_scheduler = click.option(
-    "--scheduler",
-    metavar="tcp://HOST:PORT",
-    help=(
-        "Run on the Dask cluster with this scheduler (extra `cluster`). Only for a cluster that "
-        "you trust: Dask unpickles its answers, so that it can run code here as you run code there."
+#: options that sweeps and tunings share
+study_options = options(
+    click.option(
+        "--workers",
+        type=click.IntRange(min=1),
+        help="Number of runs at a time on this machine; default: one per processor.",
     ),
+    click.option(
+        "--scheduler",
+        metavar="tcp://HOST:PORT",
+        help=(
+            "Run on the Dask cluster with this scheduler (extra `cluster`). Only for a cluster "
+            "that you trust: Dask unpickles its answers, so that it can run code here as you run "
+            "code there."
+        ),
+    ),
+    click.option(
+        "--max-runs",
+        type=click.IntRange(min=1),
+        default=MAX_RUNS,
+        show_default=True,
+        help="Refuse a study of more runs.",
+    ),
+    flag_option("--retry-failed", help="Repeat the runs that failed in an earlier call."),
+    csv_option,
 )
-_max_runs = click.option(
-    "--max-runs",
-    type=click.IntRange(min=1),
-    default=MAX_RUNS,
-    show_default=True,
-    help="Refuse a study of more runs.",
-)
-_retry = click.option(
-    "--retry-failed", is_flag=True, help="Repeat the runs that failed in an earlier call."
-)
-
-
-def study_options(command: Callable[..., int]) -> Callable[..., int]:
-    """Add the options that sweeps and tunings share to a command."""
-    return _workers(_scheduler(_max_runs(_retry(csv_option(command)))))
 
 
 def open_run_store(folder: Path, retry: bool) -> RunStore:
@@ -101,19 +99,17 @@ def create_runner(study: Study, workers: int | None, scheduler: str | None) -> C
 class StudyProgress:
     """Counter of finished runs that shows their number, rate and remaining time."""
 
-    def __init__(self, total: int, show: Callable[[str, int], None]):
+    def __init__(self, total: int, earlier: int, show: Callable[[str, int], object]):
         """Start to count.
 
         Args:
             total: number of runs of the study.
+            earlier: number of runs that an earlier call has finished.
             show: called with a text and the number of finished runs.
         """
-        self._total, self._show, self._began = total, show, time.monotonic()
-        self.finished = self.failed = self._earlier = 0
-
-    def start(self, earlier: int) -> None:
-        """Set the number of runs that an earlier call has finished."""
-        self._earlier = earlier
+        self._total, self._earlier, self._show = total, earlier, show
+        self._began = time.monotonic()
+        self.finished = self.failed = 0
 
     def __call__(self, record: Record) -> None:
         """Count a finished run and show the progress."""
@@ -141,13 +137,36 @@ def format_duration(seconds: float) -> str:
 
 
 @contextmanager
-def show_progress(total: int) -> Iterator[StudyProgress]:
+def running_study(
+    study: Study, total: int, workers: int | None, scheduler: str | None, earlier: int = 0
+) -> Iterator[tuple[CheckingRunner, StudyProgress]]:
+    """Yield the runner of a study and its progress; a termination signal is an interrupt.
+
+    Args:
+        study: The study.
+        total: The number of its runs.
+        workers: The option `--workers`.
+        scheduler: The option `--scheduler`.
+        earlier: The number of runs that an earlier call has finished.
+    """
+    from ..process.supervisor import interrupt_on_termination
+
+    with (
+        interrupt_on_termination(),
+        show_progress(total) as show,
+        create_runner(study, workers, scheduler) as runner,
+    ):
+        yield runner, StudyProgress(total, earlier, show)
+
+
+@contextmanager
+def show_progress(total: int) -> Iterator[Callable[[str, int], object]]:
     """Show the progress of `total` runs: as a bar on a terminal, else as lines."""
     if current_command_line().verbosity < 0:
-        yield StudyProgress(total, lambda _text, _done: None)
+        yield lambda _text, _done: None
         return
     if not sys.stderr.isatty():
-        yield StudyProgress(total, _ProgressLines())
+        yield _ProgressLines()
         return
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn
@@ -162,9 +181,7 @@ def show_progress(total: int) -> Iterator[StudyProgress]:
         transient=True,
     ) as bar:
         task = bar.add_task("", total=total)
-        yield StudyProgress(
-            total, lambda text, done: bar.update(task, completed=done, description=text)
-        )
+        yield lambda text, done: bar.update(task, completed=done, description=text)
 
 
 class _ProgressLines:

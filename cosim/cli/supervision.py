@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from shutil import rmtree
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from ..core.errors import CosimError
 from . import current_command_line, run_guarded
+from .options import options
 from .strict_sandbox import SANDBOX_KINDS
 
 if TYPE_CHECKING:
@@ -18,32 +19,28 @@ if TYPE_CHECKING:
     from ..process.journal import Journal
     from ..process.supervisor import SupervisedOutcome
 
-_isolation = click.option(
-    "--isolation",
-    type=click.Choice(["run", "fmu", "none"]),
-    default="run",
-    show_default=True,
-    help=(
-        "run: in a supervised child process; fmu: also each FMU in its own process; none: in this "
-        "process."
+supervision_options = options(
+    click.option(
+        "--isolation",
+        type=click.Choice(["run", "fmu", "none"]),
+        default="run",
+        show_default=True,
+        help=(
+            "run: in a supervised child process; fmu: also each FMU in its own process; none: in "
+            "this process."
+        ),
+    ),
+    click.option(
+        "--sandbox",
+        type=click.Choice(SANDBOX_KINDS),
+        metavar="[strict]",
+        help=(
+            "Run each FMU in its own process that reads only its own files, writes only to a "
+            "temporary folder, has no network and starts no programs. strict: also confine the "
+            "whole command to the files it needs and to its output directory (requires bubblewrap)."
+        ),
     ),
 )
-_sandbox = click.option(
-    "--sandbox",
-    type=click.Choice(SANDBOX_KINDS),
-    metavar="[strict]",
-    help=(
-        "Run each FMU in its own process that reads only its own files, writes only to a temporary "
-        "folder, has no network and starts no programs. "
-        "strict: also confine the whole command to the files it needs and to its output directory "
-        "(requires bubblewrap)."
-    ),
-)
-
-
-def supervision_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options `--isolation` and `--sandbox` to a command."""
-    return _isolation(_sandbox(command))
 
 
 def run_supervised_command(

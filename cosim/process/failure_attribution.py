@@ -73,12 +73,10 @@ def describe_exit_status(status: int) -> str:
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)
         name = signal.Signals(number).name if number in set(signal.Signals) else "unknown"
-        text = (
-            f"the process was ended by signal {number} ({name}, "
-            f"{(signal.strsignal(number) or '').lower()})"
-        )
+        cause = ": out of memory, or killed from outside" if number == signal.SIGKILL else ""
         return (
-            f"{text}: out of memory, or killed from outside" if number == signal.SIGKILL else text
+            f"the process was ended by signal {number} ({name}, "
+            f"{(signal.strsignal(number) or '').lower()}){cause}"
         )
     return f"it ended the process with exit code {os.WEXITSTATUS(status)}"
 

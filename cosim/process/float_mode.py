@@ -7,7 +7,7 @@ import platform
 import struct
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from typing import Any
 
@@ -18,10 +18,8 @@ from ..core import component_log
 PROBE_VALUES = 1.0, 2.0**-54, float(struct.unpack("=d", (1).to_bytes(8, sys.byteorder))[0])
 
 _ENVIRONMENT_SIZE = 512  # more than any platform's fenv_t
-_MXCSR_OFFSET, _MXCSR_DEFAULT = (
-    28,
-    0x1F80,
-)  # offset in fenv_t of Linux on x86-64, and initial value of a process
+#: offset in fenv_t of Linux on x86-64, and initial value of a process
+_MXCSR_OFFSET, _MXCSR_DEFAULT = 28, 0x1F80
 
 
 def is_changed() -> bool:
@@ -35,16 +33,10 @@ def is_default() -> bool:
     return not is_changed() and not enabled_traps()
 
 
-def _find_fegetexcept() -> Callable[[], int]:
-    try:
-        function: Callable[[], int] = ctypes.PyDLL(None).fegetexcept
-    except (AttributeError, OSError, TypeError):
-        return lambda: 0
-    return function
-
-
 #: returns the enabled floating-point traps as bits; always 0 if the C library has no fegetexcept
-enabled_traps = _find_fegetexcept()
+enabled_traps: Callable[[], int] = int
+with suppress(AttributeError, OSError, TypeError):
+    enabled_traps = ctypes.PyDLL(None).fegetexcept
 
 
 class FloatEnvironment:

@@ -33,28 +33,13 @@ def detach(parent: int | None) -> None:
         os.close(null)
 
 
-def set_limits(memory: int, open_files: int, file_size: int, cpu_seconds: int | None) -> None:
-    """Lower the limits of this process and disable core files.
-
-    Args:
-        memory: Address space in addition to the present one (bytes).
-        open_files: Number of open files.
-        file_size: Size of a written file (bytes).
-        cpu_seconds: Processor time (s); None for no limit.
-    """
-    lower_limit(resource.RLIMIT_AS, mapped_size() + memory)
-    lower_limit(resource.RLIMIT_NOFILE, open_files)
-    lower_limit(resource.RLIMIT_FSIZE, file_size)
-    lower_limit(resource.RLIMIT_CORE, 0)
-    if cpu_seconds is not None:
-        lower_limit(resource.RLIMIT_CPU, cpu_seconds)
-
-
-def lower_limit(kind: int, value: int) -> None:
-    """Set the soft and the hard limit of a resource (`resource.RLIMIT_*`).
+def lower_limit(kind: int, value: int | None) -> None:
+    """Set the soft and the hard limit of a resource (`resource.RLIMIT_*`); None changes nothing.
 
     A lower hard limit is kept.
     """
+    if value is None:
+        return
     _, hard = resource.getrlimit(kind)
     value = value if hard == resource.RLIM_INFINITY else min(value, hard)
     resource.setrlimit(kind, (value, value))

@@ -97,11 +97,10 @@ def acquire_lock(path: Path, output: Path, process: int | None = None) -> Output
         path.parent.mkdir(parents=True, exist_ok=True)
         descriptor = _open_locked(path)
     except BlockingIOError:
-        text = (
+        raise InputError(
             f'"{output}" is in use by {_read_holder(path)}; wait until it has ended, or choose '
             "another output"
-        )
-        raise InputError(text) from None
+        ) from None
     except OSError as error:
         with suppress(OSError):
             _remove_empty_folders(path, created)
@@ -110,7 +109,7 @@ def acquire_lock(path: Path, output: Path, process: int | None = None) -> Output
     try:
         holder = {
             "process": process or os.getpid(),
-            "host": _host(),
+            "host": os.uname().nodename if hasattr(os, "uname") else "this machine",
             "start": f"{datetime.now():%Y-%m-%d %H:%M:%S}",
         }
         os.ftruncate(descriptor, 0)
@@ -157,7 +156,12 @@ def _open_locked(path: Path, wait: bool = False) -> int:
     while True:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
         try:
-            _lock_if_possible(descriptor, wait)
+            try:
+                lock_descriptor(descriptor, wait)
+            except BlockingIOError:
+                raise
+            except OSError:  # without locks, files are written as if no other process did
+                pass
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(descriptor), path.stat()):
                     return descriptor
@@ -165,19 +169,6 @@ def _open_locked(path: Path, wait: bool = False) -> int:
             os.close(descriptor)
             raise
         os.close(descriptor)
-
-
-def _lock_if_possible(descriptor: int, wait: bool) -> None:
-    try:
-        lock_descriptor(descriptor, wait)
-    except BlockingIOError:
-        raise
-    except OSError:  # without locks, files are written as if no other process did
-        return
-
-
-def _host() -> str:
-    return os.uname().nodename if hasattr(os, "uname") else "this machine"
 
 
 def _read_holder(path: Path) -> str:

@@ -17,7 +17,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -95,12 +95,9 @@ def _umask() -> int:
     return mask
 
 
-def _locale() -> bytes:
-    return bytes(_c_library().setlocale(locale.LC_ALL, None) or b"C")
-
-
-def _set_locale(name: bytes) -> None:
-    _c_library().setlocale(locale.LC_ALL, name)
+def _set_locale(name: bytes | None) -> bytes:
+    """Set the locale of the C library unless `name` is None; return the present one."""
+    return bytes(_c_library().setlocale(locale.LC_ALL, name) or b"C")
 
 
 def _c_environment() -> dict[bytes, bytes]:
@@ -140,10 +137,6 @@ def signal_mask() -> set[int]:
 def set_signal_mask(mask: set[int]) -> None:
     """Set the numbers of the signals that this thread blocks."""
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-
-
-def _restore_float_mode(environment: FloatEnvironment) -> str | None:
-    return "" if environment.restore() else None
 
 
 def _signal_actions() -> dict[int, bytes]:
@@ -249,10 +242,14 @@ def _compared(name: str, read: Callable[[], Any], write: Callable[[Any], object]
 
 
 _ATTRIBUTES = (
-    _Attribute("the floating-point mode", FloatEnvironment, _restore_float_mode),
+    _Attribute(
+        "the floating-point mode",
+        FloatEnvironment,
+        lambda environment: "" if environment.restore() else None,
+    ),
     _compared("the working directory", _working_directory, _set_working_directory),
     _compared("the file mode mask", _umask, os.umask),
-    _compared("the locale", _locale, _set_locale),
+    _compared("the locale", lambda: _set_locale(None), _set_locale),
     _compared("the environment", _c_environment, _set_c_environment),
     _Attribute("what is done upon", _signal_actions, _restore_signal_actions),
     _compared("which signals are blocked", signal_mask, set_signal_mask),
@@ -269,24 +266,14 @@ _lock = threading.RLock()
 _saved_states: list[ProcessState] = []
 
 
-class _StateCache:
-    """The last state that was read, with its encoding.
+@lru_cache(maxsize=1)
+def _encoded_state(_encoding: bytes) -> ProcessState:
+    """Return the present state; the last one is kept, because reading takes longer than encoding.
 
-    Reading a state takes much longer than encoding it.
+    Args:
+        _encoding: The encoding of the present state.
     """
-
-    def __init__(self) -> None:
-        self._encoding, self._state = b"", ProcessState()
-
-    def read(self) -> tuple[bytes, ProcessState]:
-        """Return the encoding of the present state and the state.
-
-        The encoding is b"" without the extension module.
-        """
-        encoding = _encode()
-        if not encoding or encoding != self._encoding:
-            self._encoding, self._state = encoding, ProcessState()
-        return encoding, self._state
+    return ProcessState()
 
 
 #: device and inode of the files behind the standard streams, see `_output_files`; root folder and
@@ -329,7 +316,8 @@ def call_restoring_process_state(
 
 def _save_state() -> tuple[bytes, ProcessState, _Files | None]:
     """Return the present state, its encoding, and the accessible files of a supervised process."""
-    encoding, state = _state_cache().read()
+    encoding = _encode()  # b"" without the extension module
+    state = _encoded_state(encoding) if encoding else ProcessState()
     _saved_states.append(state)
     return encoding, state, (_output_files(), _file_access()) if current_journal() else None
 
@@ -361,11 +349,6 @@ def exclusive_process_state() -> Iterator[None]:
     """Exclude other threads from such blocks and from `restoring_process_state`."""
     with _lock:
         yield
-
-
-@cache
-def _state_cache() -> _StateCache:
-    return _StateCache()
 
 
 def _release_after_fork() -> None:

@@ -120,7 +120,8 @@ def run_supervised(
         The outcome, also if the child crashed or was killed.
     """
     journal = Journal(mmap.mmap(-1, JOURNAL_SIZE))
-    _adopt_orphans()
+    if sys.platform == "linux":  # orphaned descendants become children, which can be killed
+        ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1)
     with (
         temporary_run_folder() as folder,
         TemporaryFile(dir=folder) as stack,
@@ -215,12 +216,6 @@ def interrupt_on_termination() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _adopt_orphans() -> None:
-    """Make orphaned descendants children of this process, which can kill them (Linux)."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1)
-
-
 @dataclass
 class _Supervisor:
     """Supervision of a child process.
@@ -281,8 +276,11 @@ class _Supervisor:
                 if pid:
                     self._stop_time = time.monotonic() if os.WIFSTOPPED(status) else 0.0
                 self._check_deadline()
-            except KeyboardInterrupt:
-                self._forward_interrupt()
+            except KeyboardInterrupt:  # the second one kills the child
+                with suppress(ProcessLookupError):
+                    number = signal.SIGKILL if self._interrupt_time else signal.SIGINT
+                    os.kill(self.child, number)
+                self._interrupt_time = self._interrupt_time or time.monotonic()
 
     def _check_deadline(self) -> None:
         """Kill a child that exceeds a deadline.
@@ -325,12 +323,6 @@ class _Supervisor:
             now - self._progress_time - waiting > deadline
             or now - self._progress_time > MAX_EXTENSION * deadline
         )
-
-    def _forward_interrupt(self) -> None:
-        """Send SIGINT to the child for the first interrupt, SIGKILL for the second."""
-        with suppress(ProcessLookupError):
-            os.kill(self.child, signal.SIGKILL if self._interrupt_time else signal.SIGINT)
-        self._interrupt_time = self._interrupt_time or time.monotonic()
 
     def _kill_descendants(self) -> None:
         """Kill all processes that the child left behind, also those outside its session."""

@@ -71,7 +71,7 @@ class Diagram:
 def build_diagram(system: Mapping[str, Any]) -> Diagram:
     """Return the diagram of a system that `scenario.overview.describe_system` has described."""
     known = {component["name"]: component for component in system["components"]}
-    layout = _place_side_by_side(system["stages"])
+    layout = _lay_out(system["stages"])
     boxes = {
         name: _build_box(known[name], *position) for name, position in layout.positions.items()
     }
@@ -97,9 +97,27 @@ class _GridLayout(NamedTuple):
     rows: float
 
 
-def _place_side_by_side(stages: Sequence[Sequence[Any]]) -> _GridLayout:
-    """Lay out stages from left to right, each centred vertically."""
-    blocks = [_place_below_each_other(map(_layout_member, stage)) for stage in stages]
+def _lay_out(stages: Sequence[Sequence[Any]]) -> _GridLayout:
+    """Lay out stages from left to right, each centred vertically.
+
+    The members of a stage lie one below the other, a nested system with space for its frame.
+    """
+    blocks = []
+    for stage in stages:
+        block = _GridLayout({}, 0, 0.0)
+        for member in stage:
+            if isinstance(member, str):
+                inner, height = _GridLayout({member: (0, 0)}, 1, 1), 1.0
+            else:
+                inner = _lay_out(member["stages"])
+                inner = inner._replace(positions=_shifted(inner, 0, FRAME_ROWS))
+                height = inner.rows + 2 * FRAME_ROWS
+            block = _GridLayout(
+                block.positions | _shifted(inner, 0, block.rows),
+                max(block.columns, inner.columns),
+                block.rows + height,
+            )
+        blocks.append(block)
     rows = max((block.rows for block in blocks), default=0)
     positions: dict[str, tuple[float, float]] = {}
     columns = 0
@@ -107,24 +125,6 @@ def _place_side_by_side(stages: Sequence[Sequence[Any]]) -> _GridLayout:
         positions |= _shifted(block, columns, (rows - block.rows) / 2)
         columns += block.columns
     return _GridLayout(positions, columns, rows)
-
-
-def _place_below_each_other(blocks: Iterable[_GridLayout]) -> _GridLayout:
-    """Lay out the members of a stage from top to bottom."""
-    positions: dict[str, tuple[float, float]] = {}
-    columns, rows = 0, 0.0
-    for block in blocks:
-        positions |= _shifted(block, 0, rows)
-        columns, rows = max(columns, block.columns), rows + block.rows
-    return _GridLayout(positions, columns, rows)
-
-
-def _layout_member(member: Any) -> _GridLayout:
-    """Lay out a component, or a nested system with space for its frame."""
-    if isinstance(member, str):
-        return _GridLayout({member: (0, 0)}, 1, 1)
-    block = _place_side_by_side(member["stages"])
-    return _GridLayout(_shifted(block, 0, FRAME_ROWS), block.columns, block.rows + 2 * FRAME_ROWS)
 
 
 def _shifted(block: _GridLayout, columns: float, rows: float) -> dict[str, tuple[float, float]]:
@@ -170,12 +170,10 @@ def _connections_by_pair(
     lines: dict[tuple[str, str], list[str]] = {}
     for source, target, unit, note in connections:
         ends = _component_of(source, boxes), _component_of(target, boxes)
-        text = (
-            f"{source} → {target}"
-            + (f"  [{unit}]" if unit else "")
-            + (f"  ({note})" if note else "")
-        )
-        if ends[0] and ends[1]:
+        text = f"{source} → {target}"
+        text += f"  [{unit}]" if unit else ""
+        text += f"  ({note})" if note else ""
+        if all(ends):
             lines.setdefault(ends, []).append(text)
     return lines
 
@@ -191,10 +189,9 @@ def _wires(
     feedbacks = 0
     for (source, target), lines in connections.items():
         start, end = boxes[source], boxes[target]
-        more = (
-            [f"and {len(lines) - MAX_TOOLTIP_LINES} more"] if len(lines) > MAX_TOOLTIP_LINES else []
-        )
-        tooltip = "\n".join([*lines[:MAX_TOOLTIP_LINES], *more])
+        tooltip = "\n".join(lines[:MAX_TOOLTIP_LINES])
+        if len(lines) > MAX_TOOLTIP_LINES:
+            tooltip += f"\nand {len(lines) - MAX_TOOLTIP_LINES} more"
         if end.x > start.x:
             path, x, y = _forward_path(start, end)
         else:
@@ -256,8 +253,6 @@ def _frames(boxes: Iterable[Box]) -> Iterator[Frame]:
             groups.setdefault(outer, []).append(box)
     for name, members in groups.items():
         x, y = min(box.x for box in members) - FRAME_GAP, min(box.y for box in members) - FRAME_GAP
-        right, low = (
-            max(box.x for box in members) + WIDTH + FRAME_GAP,
-            max(box.y for box in members) + HEIGHT + FRAME_GAP,
-        )
+        right = max(box.x for box in members) + WIDTH + FRAME_GAP
+        low = max(box.y for box in members) + HEIGHT + FRAME_GAP
         yield Frame(name, x, y, right - x, low - y)

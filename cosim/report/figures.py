@@ -95,19 +95,12 @@ def draw_figure(
             raise evaluation.failure(
                 "figure", f"returned {type(figure).__name__}, expected a matplotlib.figure.Figure"
             )
-        _fix_layout(figure)
+        # laid out once, for all of its files; axes that are not in a grid keep their positions
+        engine = figure.get_layout_engine()
+        if engine and any(axes.get_subplotspec() for axes in figure.axes):
+            engine.execute(figure)
+        figure.set_layout_engine("none")
     return figure
-
-
-def _fix_layout(figure: Figure) -> None:
-    """Lay a figure out once, for all of its files.
-
-    Axes that are not in a grid keep their positions.
-    """
-    engine = figure.get_layout_engine()
-    if engine and any(axes.get_subplotspec() for axes in figure.axes):
-        engine.execute(figure)
-    figure.set_layout_engine("none")
 
 
 def save_figure(figure: Figure, path: Path) -> None:
@@ -183,13 +176,13 @@ def write_figure_data(figure: Figure, path: Path) -> bool:
         points += [*_curve_points(axes), *_bar_points(axes)]
     if not points:
         return False
-    header = ("panel", "curve", text_cell(figure.axes[-1].get_xlabel() or "x"), "value")
     with (
         writing_atomically(path) as temporary,
         temporary.open("w", encoding="utf-8", newline="") as file,
     ):
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
+        x_label = text_cell(figure.axes[-1].get_xlabel() or "x")
+        writer.writerow(("panel", "curve", x_label, "value"))
         for panel, curve, x, y in points:
             x = text_cell(x) if isinstance(x, str) else x
             writer.writerow((text_cell(panel), text_cell(curve), x, y))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..core.errors import InputError
@@ -37,7 +37,12 @@ def result_as_html(result: Result) -> str:
         lines += [
             "<table><thead><tr><th>KPI</th><th>value</th><th>unit</th><th>check</th></tr></thead><tbody>"
         ]
-        for row in _kpi_rows(result):
+        units = result.metadata.get("kpi_units", {})
+        checks = {outcome.check["kpi"]: outcome for outcome in result.checks}
+        for kpi, value in result.kpis.items():
+            outcome = checks.get(kpi)
+            check = f"{outcome.limits} {'✓' if outcome.passed else '✗'}" if outcome else ""
+            row = (kpi, format_number(value), units.get(kpi, ""), check)
             cells = "".join(f"<td>{html.escape(cell)}</td>" for cell in row)
             lines.append(f"<tr>{cells}</tr>")
         lines += ["</tbody></table>"]
@@ -48,15 +53,6 @@ def result_as_html(result: Result) -> str:
         style = f"width:100%;height:{_HEIGHT}px;border:1px solid #ccc"
         lines.append(f'<iframe sandbox="allow-scripts" style="{style}" srcdoc="{page}"></iframe>')
     return "\n".join(lines)
-
-
-def _kpi_rows(result: Result) -> Iterator[tuple[str, str, str, str]]:
-    units = result.metadata.get("kpi_units", {})
-    checks = {outcome.check["kpi"]: outcome for outcome in result.checks}
-    for name, value in result.kpis.items():
-        outcome = checks.get(name)
-        check = f"{outcome.limits} {'✓' if outcome.passed else '✗'}" if outcome else ""
-        yield name, format_number(value), units.get(name, ""), check
 
 
 def plot_signals(result: Result, patterns: Sequence[str]) -> Figure:

@@ -54,8 +54,7 @@ def write_report(
         InputError: The result has no rows, or the file cannot be written.
         OutputError: The disk is full or failed.
     """
-    text = render_report(result, outcomes, figures)
-    write_file(path, text)
+    write_file(path, render_report(result, outcomes, figures))
 
 
 def render_report(
@@ -220,9 +219,8 @@ def write_folder_report(
         and len(outcomes) == len(checks)
         and all(outcome.passed for outcome in outcomes)
     )
-    run.metadata["deviation"] = (
-        list(_deviation_lines(run, deviation, is_accepted)) if deviation else []
-    )
+    if deviation:
+        run.metadata["deviation"] = list(_deviation_lines(run, deviation, is_accepted))
     write_report(run, outcomes, draw_scenario_figures(run, more_figures), target)
 
 

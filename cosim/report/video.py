@@ -71,7 +71,11 @@ def write_video(
         InputError: The extra "video" is missing, the camera is unknown, or no component of the run
             renders frames.
     """
-    encoder = _import_encoder()
+    try:
+        import imageio_ffmpeg
+    except ImportError:
+        raise InputError('videos need the extra "video": pip install "fmi-cosim[video]"') from None
+    encoder: ModuleType = imageio_ffmpeg
     source = frame_source or find_frame_source(result)
     job = RenderJob(source, result, camera, frame_times(result, frame_rate), size)
     with writing_atomically(path) as temporary:
@@ -114,15 +118,6 @@ def frame_times(result: Result, rate: int) -> np.ndarray:
     return times
 
 
-def _import_encoder() -> ModuleType:
-    try:
-        import imageio_ffmpeg
-    except ImportError:
-        raise InputError('videos need the extra "video": pip install "fmi-cosim[video]"') from None
-    module: ModuleType = imageio_ffmpeg
-    return module
-
-
 def _encode_video(
     encoder: ModuleType,
     job: RenderJob,
@@ -131,9 +126,8 @@ def _encode_video(
     progress: Callable[[int, int], None] | None,
 ) -> None:
     with closing(render_frames(job)) as frames:
-        first = next(
-            frames
-        )  # before the encoder starts, which would add its own message to an error
+        # before the encoder starts, which would add its own message to an error
+        first = next(frames)
         writer = encoder.write_frames(
             str(file), job.size, fps=rate, macro_block_size=2, quality=7, ffmpeg_log_level="error"
         )
@@ -225,9 +219,8 @@ def _receive_frame(worker: subprocess.Popen[bytes]) -> np.ndarray:
 
 def main() -> None:
     """Render the job on standard input and write the frames to standard output."""
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # an interrupt reaches the parent too, which kills this process
+    # an interrupt reaches the parent too, which kills this process
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     with os.fdopen(os.dup(1), "wb") as channel:
         os.dup2(2, 1)  # what libraries print goes to standard error
         job: RenderJob = pickle.load(sys.stdin.buffer)  # noqa: S301

@@ -110,13 +110,15 @@ def _optional(field: FieldInfo) -> tuple[Any, FieldInfo]:
 
 # -- paths of files in the JSON of scenarios and nested systems
 
-#: entries other than components that name files: models of the elements of lists, and of objects
-_LISTS: Mapping[str, type[Spec]] = {
+#: entries other than components that name files, and their models or those of their elements
+_MODELS: Mapping[str, type[Spec]] = {
+    "scene": CallSpec,
+    "reference": ReferenceSpec,
     "inputs": InputTableSource,
     "kpis": CallSpec,
     "figures": CallSpec,
 }
-_OBJECTS: Mapping[str, type[Spec]] = {"scene": CallSpec, "reference": ReferenceSpec}
+_OBJECTS = ("scene", "reference")
 
 
 def change_paths(system: Mapping[str, Any], change: PathChange) -> dict[str, Any]:
@@ -134,36 +136,28 @@ def change_paths(system: Mapping[str, Any], change: PathChange) -> dict[str, Any
         return {**entry, **changed}
 
     result = dict(system)
-    for name, model in _OBJECTS.items():
-        if name in system:
-            result[name] = change_entry(system[name], path_keys(model))
-    for name, model in _LISTS.items():
-        match system.get(name):
+    for name in system.keys() & _MODELS.keys():
+        keys = path_keys(_MODELS[name])
+        match system[name]:
+            case entry if name in _OBJECTS:
+                result[name] = change_entry(entry, keys)
             case list(entries):
-                result[name] = [change_entry(each, path_keys(model)) for each in entries]
+                result[name] = [change_entry(each, keys) for each in entries]
             case dict(entries):  # changes of a file with "extends", by name
-                result[name] = {
-                    each: change_entry(entry, path_keys(model)) for each, entry in entries.items()
-                }
+                result[name] = {each: change_entry(entries[each], keys) for each in entries}
     if isinstance(components := system.get("components"), Mapping):
         changed = result["components"] = dict(components)
         for name, entry in components.items():
-            changed[name] = change_entry(entry, _path_keys_of_component(entry))
-            if isinstance(entry, Mapping) and isinstance(entry.get(NestedSystem.KEY), Mapping):
-                changed[name][NestedSystem.KEY] = _change_inline(entry[NestedSystem.KEY], change)
+            if not isinstance(entry, Mapping):
+                continue
+            marks: dict[str, HoldsPaths] = {}
+            for kind in component_kinds(entry).values():
+                marks |= path_keys(kind)
+            changed[name] = change_entry(entry, marks)
+            inline = entry.get(NestedSystem.KEY)
+            if isinstance(inline, Mapping):
+                inner = changed[name][NestedSystem.KEY] = change_paths(inline, change)
+                base = inline.get("extends")
+                if isinstance(base, str) and (base.endswith(".json") or "/" in base):
+                    inner["extends"] = change(base)
     return result
-
-
-def _change_inline(system: Mapping[str, Any], change: PathChange) -> dict[str, Any]:
-    """Return an inline nested system in which every path is changed, also that of its base."""
-    changed, base = change_paths(system, change), system.get("extends")
-    if isinstance(base, str) and (base.endswith(".json") or "/" in base):
-        changed["extends"] = change(base)
-    return changed
-
-
-def _path_keys_of_component(entry: Any) -> Mapping[str, HoldsPaths]:
-    marks: dict[str, HoldsPaths] = {}
-    for kind in component_kinds(entry if isinstance(entry, Mapping) else ()).values():
-        marks |= path_keys(kind)
-    return marks

@@ -214,10 +214,8 @@ class SolverSpec(Spec):
     """Integration of a Model Exchange FMU."""
 
     method: Method = key(
-        (
-            '"euler", "rk4": explicit methods with fixed step size; "cvode": BDF with variable '
-            "step size and root finding"
-        ),
+        '"euler", "rk4": explicit methods with fixed step size; "cvode": BDF with variable '
+        "step size and root finding",
         "euler",
     )
     step_size: Period | None = key(
@@ -246,18 +244,14 @@ class FmuSource(_FmuBased):
 
     fmu: FilePath = key("path of an FMU", "../fmus/strider_autopilot.fmu")
     solver: SolverSpec | None = key(
-        (
-            "simulate by Model Exchange with this solver; default: by Co-Simulation if the FMU has "
-            "it, else cvode"
-        ),
+        "simulate by Model Exchange with this solver; default: by Co-Simulation if the FMU has "
+        "it, else cvode",
         {"method": "euler", "step_size": 0.001},
         default=None,
     )
     tolerance: float | None = key(
-        (
-            "relative tolerance of the FMU and of its solver; default: that of the FMU's default "
-            "experiment"
-        ),
+        "relative tolerance of the FMU and of its solver; default: that of the FMU's default "
+        "experiment",
         1e-6,
         default=None,
         gt=0,
@@ -340,10 +334,8 @@ class ModelicaSource(_FmuBased):
         "MyAutopilot.mo:MyAutopilot",
     )
     libraries: FolderPaths = key(
-        (
-            "folders of Modelica libraries, searched before those of MODELICAPATH; only for "
-            "Modelica models"
-        ),
+        "folders of Modelica libraries, searched before those of MODELICAPATH; only for "
+        "Modelica models",
         ["../modelica"],
         default=[],
     )
@@ -431,6 +423,7 @@ SOURCES: tuple[type[Source], ...] = (
     InputTableSource,
 )
 _COMPONENT_KINDS = {kind.KEY: kind for kind in SOURCES if issubclass(kind, ComponentSource)}
+_OWN_KEYS = frozenset().union(*(kind.model_fields for kind in _COMPONENT_KINDS.values()))
 
 
 def component_kinds(keys: Iterable[str] | None = ()) -> Mapping[str, type[ComponentSource]]:
@@ -439,14 +432,9 @@ def component_kinds(keys: Iterable[str] | None = ()) -> Mapping[str, type[Compon
     Those of other packages are only looked up, which takes time, if one of `keys` is no key of a
     kind of cosim, or if `keys` is None.
     """
-    if keys is not None and all(each in _own_keys() for each in keys):
+    if keys is not None and _OWN_KEYS.issuperset(keys):
         return _COMPONENT_KINDS
     return _COMPONENT_KINDS | _kinds_of_packages()
-
-
-@cache
-def _own_keys() -> frozenset[str]:
-    return frozenset().union(*(kind.model_fields for kind in _COMPONENT_KINDS.values()))
 
 
 @cache
@@ -465,7 +453,7 @@ def _kinds_of_packages() -> dict[str, type[ComponentSource]]:
             raise InputError(f"{who}: expected a subclass of ComponentSource, found {kind!r}")
         if entry.name != getattr(kind, "KEY", "") or entry.name not in kind.model_fields:
             raise InputError(f'{who}: expected KEY = "{entry.name}", and a field of this name')
-        if entry.name in _own_keys() or entry.name in kinds:
+        if entry.name in _OWN_KEYS or entry.name in kinds:
             raise InputError(f"{who}: this key is taken")
         kinds[entry.name] = kind
     return kinds

@@ -49,10 +49,8 @@ class FunctionSpec(CallSpec):
         "altitude",
     )
     optional: bool = key(
-        (
-            "leave it out with a warning if an argument names a signal or parameter that does not "
-            "exist"
-        ),
+        "leave it out with a warning if an argument names a signal or parameter that does not "
+        "exist",
         True,
         default=False,
     )

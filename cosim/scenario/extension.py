@@ -338,7 +338,7 @@ class _Merger:
                 )
             elif change.value is None:
                 if before:
-                    self.removed.add(place)
+                    self.removed.add((*path, key))
                 else:
                     own = not path and key in NOT_INHERITED
                     hint = ", it is not inherited" if own else did_you_mean(str(key), names)

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 from itertools import count, takewhile
 from typing import Any, TypeVar
 
-from ..core.component import Component, Variable
+from ..core.component import Variable
 from ..core.errors import Problem, did_you_mean
 from .evaluation_schema import CallSpec, FunctionSpec
 from .json_document import find_value, missing_value, pointer_keys
@@ -42,7 +42,7 @@ class FunctionResolver:
 
     Attributes:
         root: The scenario.
-        components: All components by full name.
+        variables: Variables of all components by full name of the component and by name.
         start_values: Values that the scenario and the caller set, by component and variable.
         signals: Names of the recorded signals; None if they are not all known.
         problems: Arguments that cannot be resolved.
@@ -50,7 +50,7 @@ class FunctionResolver:
     """
 
     root: Node
-    components: Mapping[str, Component]
+    variables: Mapping[str, Mapping[str, Variable]]
     start_values: Mapping[str, Mapping[str, Any]]
     signals: Collection[str] | None
     problems: list[Problem] = field(default_factory=list)
@@ -109,15 +109,13 @@ class FunctionResolver:
                 problems.append(Problem(str(error), self.root.where(*path, "arguments", name)))
         if spec.sources:
             for name, is_required in declared_arguments(spec, self.root.folder).items():
-                if name not in arguments:
-                    self._add_argument(
-                        arguments,
-                        name,
-                        spec.sources,
-                        is_required,
-                        problems,
-                        self.root.where(*path, "from"),
-                    )
+                try:
+                    if name not in arguments:
+                        arguments[name] = self._value_from(spec.sources, name)
+                except UnknownNameError as error:
+                    if is_required:
+                        text = str(error) and f"{error} for the argument {name}"
+                        problems.append(Problem(text, self.root.where(*path, "from")))
         return spec.model_copy(update={"arguments": arguments, "sources": []})
 
     def _type_problems(self, resolved: CallSpec, spec: CallSpec, *path: str | int) -> list[Problem]:
@@ -133,27 +131,16 @@ class FunctionResolver:
                 problems.append(Problem(f"argument {name}: {text}", self.root.where(*path, "from")))
         return problems
 
-    def _add_argument(
-        self,
-        arguments: dict[str, Any],
-        name: str,
-        sources: Sequence[str],
-        is_required: bool,
-        problems: list[Problem],
-        where: str,
-    ) -> None:
-        """Take one argument from the first source that has it."""
+    def _value_from(self, sources: Sequence[str], name: str) -> Any:
+        """Return the value of an argument from the first source that has it."""
         errors = []
         for source in sources:
+            separator = "/" if source.startswith("/") else "."
             try:
-                arguments[name] = self._resolve_name(
-                    f"{source}/{name}" if source.startswith("/") else f"{source}.{name}"
-                )
-                return
+                return self._resolve_name(source + separator + name)
             except UnknownNameError as error:
-                errors.append(str(error))
-        if is_required:
-            problems.append(Problem(errors[0] and f"{errors[0]} for the argument {name}", where))
+                errors.append(error)
+        raise errors[0]
 
     def _resolve_value(self, value: Any) -> Any:
         if isinstance(value, list):
@@ -165,13 +152,12 @@ class FunctionResolver:
         return self._resolve_name(value["from"])
 
     def _resolve_name(self, name: str) -> Any:
-        return self._value_at(name) if name.startswith("/") else self._value_of(name)
-
-    def _value_at(self, pointer: str) -> Any:
-        keys = pointer_keys(pointer)
+        if not name.startswith("/"):
+            return self._value_of(name)
+        keys = pointer_keys(name)
         value, depth = find_value(self.root.document.value, keys)
         if depth < len(keys):
-            raise UnknownNameError(missing_value(self.root.document.value, pointer))
+            raise UnknownNameError(missing_value(self.root.document.value, name))
         return value
 
     def _value_of(self, name: str) -> Any:
@@ -179,14 +165,10 @@ class FunctionResolver:
 
         A port of a nested system has that of its first inner variable.
         """
-        target = next(
-            iter(resolve_name(self.root, name, ("parameters", "inputs"), include_inner=True))
-        )
-        if target.component not in self.components:
+        target, *_ = resolve_name(self.root, name, ("parameters", "inputs"), include_inner=True)
+        if target.component not in self.variables:
             raise UnknownNameError
-        variables = {
-            variable.name: variable for variable in self.components[target.component].variables
-        }
+        variables = self.variables[target.component]
         if target.prefix in variables:
             return self._value_of_variable(target, variables[target.prefix])
         names = (f"{target.prefix}[{i}]" for i in count(1))

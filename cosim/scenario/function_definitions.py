@@ -56,16 +56,20 @@ def function_definition(spec: CallSpec, folder: Path) -> ast.FunctionDef:
     file, _, name = spec.python.rpartition(":")
     path = source_path(file, folder)
     assert path is not None
-    return function_definitions(path)[name]
+    return function_definitions(path, name)[name]
 
 
-def function_definitions(path: Path) -> dict[str, ast.FunctionDef]:
-    """Return the functions at the top level of a file, and those from files beside it, by name.
+def function_definitions(path: Path, wanted: str = "") -> Mapping[str, ast.FunctionDef]:
+    """Return the functions at the top level of a file by name.
+
+    If `wanted` is none of them, those that it imports from files beside it are included.
 
     Raises:
         SyntaxError: The file is not valid Python.
     """
     source = _parse(path.read_bytes())
+    if wanted in source.functions:
+        return source.functions
     found: dict[str, ast.FunctionDef] = {}
     for module, names in source.imported.items():
         file = path.with_name(f"{module}.py")
@@ -135,18 +139,20 @@ def _literal_key(key: ast.expr) -> str:
     return ""
 
 
-#: what a value must be, by the name in an annotation
-_DESCRIPTIONS = {
-    "float": "a number",
-    "int": "an integer",
-    "bool": "true or false",
-    "str": "a text",
-    "Signal": "the name of a signal",
-    "Prefix": "a prefix of names of signals",
-    "None": "null",
+#: by the name in an annotation: the type of the values, a type that is none of them although it is
+#: derived from it, and the description in messages
+_KINDS: dict[str, tuple[Any, Any, str]] = {
+    "float": (Real, bool, "a number"),
+    "int": (Integral, bool, "an integer"),
+    "bool": (bool, (), "true or false"),
+    "str": (str, (), "a text"),
+    "Signal": (str, (), "the name of a signal"),
+    "Prefix": (str, (), "a prefix of names of signals"),
+    "None": (type(None), (), "null"),
+    **dict.fromkeys(("dict", "Dict", "Mapping"), (Mapping, (), "an object")),
 }
 _LISTS = ("list", "List", "Sequence", "tuple", "Tuple", "Iterable", "Collection")
-_OBJECTS = ("dict", "Dict", "Mapping")
+_KINDS |= dict.fromkeys(_LISTS, (Sequence, str, "a list"))
 
 
 def argument_problem(annotation: ast.expr | None, value: Any) -> str:
@@ -168,21 +174,31 @@ def argument_problem(annotation: ast.expr | None, value: Any) -> str:
     )
 
 
-def _accepts(annotation: ast.expr, value: Any) -> bool:
+def _members(annotation: ast.expr) -> list[ast.expr]:
+    """Return the types of a union; those of other annotations are themselves."""
     match annotation:
         case ast.BinOp(left, ast.BitOr(), right):
-            return _accepts(left, value) or _accepts(right, value)
+            return [*_members(left), *_members(right)]
         case ast.Subscript(kind, ast.Tuple(kinds)) if _name(kind) == "Union":
-            return any(_accepts(each, value) for each in kinds)
+            return list(chain.from_iterable(map(_members, kinds)))
         case ast.Subscript(kind, inner) if _name(kind) == "Optional":
-            return value is None or _accepts(inner, value)
-        case ast.Subscript(kind, inner) if _name(kind) in _LISTS:
-            return _accepts_name("list", value) and all(
-                _accepts(each, item) for each, item in _elements(inner, value)
-            )
-        case ast.Subscript(kind):
-            return _accepts_name(_name(kind), value)
-    return _accepts_name(_name(annotation), value)
+            return [*_members(inner), ast.Constant(None)]
+    return [annotation]
+
+
+def _accepts(annotation: ast.expr, value: Any) -> bool:
+    return any(_member_accepts(member, value) for member in _members(annotation))
+
+
+def _member_accepts(member: ast.expr, value: Any) -> bool:
+    kind, inner = (
+        (member.value, member.slice) if isinstance(member, ast.Subscript) else (member, None)
+    )
+    accepted, refused, _ = _KINDS.get(_name(kind), (object, (), ""))
+    if not isinstance(value, accepted) or isinstance(value, refused):
+        return False
+    elements = _elements(inner, value) if inner and _name(kind) in _LISTS else []
+    return all(_accepts(each, item) for each, item in elements)
 
 
 def _elements(inner: ast.expr, value: Sequence[Any]) -> list[tuple[ast.expr, Any]]:
@@ -198,41 +214,19 @@ def _elements(inner: ast.expr, value: Sequence[Any]) -> list[tuple[ast.expr, Any
     return [(inner, item) for item in value]
 
 
-def _accepts_name(name: str, value: Any) -> bool:
-    match name:
-        case "float":
-            return isinstance(value, Real) and not isinstance(value, bool)
-        case "int":
-            return isinstance(value, Integral) and not isinstance(value, bool)
-        case "bool":
-            return isinstance(value, bool)
-        case "str" | "Signal" | "Prefix":
-            return isinstance(value, str)
-        case "None":
-            return value is None
-    if name in _LISTS:
-        return isinstance(value, Sequence) and not isinstance(value, str)
-    return name not in _OBJECTS or isinstance(value, Mapping)
-
-
 def _describe(annotation: ast.expr) -> str:
     """Return what an annotation accepts: "a number or null"."""
-    match annotation:
-        case ast.BinOp(left, ast.BitOr(), right):
-            return f"{_describe(left)} or {_describe(right)}"
-        case ast.Subscript(kind, ast.Tuple(kinds)) if _name(kind) == "Union":
-            return " or ".join(map(_describe, kinds))
-        case ast.Subscript(kind, inner) if _name(kind) == "Optional":
-            return f"{_describe(inner)} or null"
-        case ast.Subscript(kind, inner) if _name(kind) in _LISTS:
+    texts: list[str] = []
+    for member in _members(annotation):
+        kind = member.value if isinstance(member, ast.Subscript) else member
+        name = _name(kind)
+        text = _KINDS[name][2] if name in _KINDS else name
+        if isinstance(member, ast.Subscript) and name in _LISTS:
+            inner = member.slice
             first = inner.elts[0] if isinstance(inner, ast.Tuple) else inner
-            return f"a list, each element {_describe(first)}"
-        case ast.Subscript(kind):
-            return _describe(kind)
-    name = _name(annotation)
-    if name in _LISTS:
-        return "a list"
-    return "an object" if name in _OBJECTS else _DESCRIPTIONS.get(name, name)
+            text += f", each element {_describe(first)}"
+        texts.append(text)
+    return " or ".join(texts)
 
 
 def _name(annotation: ast.expr) -> str:

@@ -88,15 +88,14 @@ def set_excesses(prepared: PreparedRun) -> dict[tuple[str, str], Problem]:
         if excesses:
             key = (name, variable.name)
             places[key] = places.get(key, 0) + 1
-            found.setdefault(
-                key, Problem(_describe(name, variable, excesses, given, limits), where)
-            )
-    return {key: _with_count(problem, places[key] - 1) for key, problem in found.items()}
-
-
-def _with_count(problem: Problem, further: int) -> Problem:
-    rest = f" (and {count_noun(further, 'further value')})" if further else ""
-    return Problem(problem.message + rest, problem.where)
+            first = excesses[0]
+            excess = _Excess(Endpoint(name, first), variable, 0.0, given[first], limits[first])
+            found.setdefault(key, Problem(_describe(excess, len(excesses)), where))
+    for key, problem in found.items():
+        if further := places[key] - 1:
+            text = f"{problem.message} (and {count_noun(further, 'further value')})"
+            found[key] = Problem(text, problem.where)
+    return found
 
 
 def _set_values(prepared: PreparedRun) -> Iterator[tuple[str, Variable, Any, str]]:
@@ -113,12 +112,8 @@ def _set_values(prepared: PreparedRun) -> Iterator[tuple[str, Variable, Any, str
         for name, values in values_by_component.items():
             for variable in prepared.system.components[name].variables:
                 if variable.causality == "input" and variable.name in values:
-                    yield (
-                        name,
-                        variable,
-                        values[variable.name],
-                        where or places.get((name, variable.name), ""),
-                    )
+                    place = where or places.get((name, variable.name), "")
+                    yield name, variable, values[variable.name], place
 
 
 def _assigned_places(prepared: PreparedRun) -> Mapping[tuple[str, str], str]:
@@ -131,24 +126,19 @@ def _assigned_places(prepared: PreparedRun) -> Mapping[tuple[str, str], str]:
     return places
 
 
-def _describe(
-    name: str,
-    variable: Variable,
-    scalars: list[str],
-    given: Mapping[str, float],
-    limits: Mapping[str, tuple[float, float]],
-) -> str:
-    first, unit = scalars[0], variable.unit.name if variable.unit else ""
-    low, high = limits[first]
-    others = f" (and {count_noun(len(scalars) - 1, 'more element')})" if len(scalars) > 1 else ""
-    cause = probable_cause(
-        given[first], limits[first], unit, "the value, or a value of the vehicle is wrong"
-    )
-    end = Endpoint(name, first)
-    return (
-        f"{end}{others} is set to {given[first]:.4g} {unit}, outside its limits {low:.4g} ... "
-        f"{high:.4g} {unit}; {cause}"
-    )
+def _describe(excess: _Excess, count: int) -> str:
+    """Return the warning about one input, of which a number of elements is outside."""
+    end, variable, share, value, limits = excess
+    unit = variable.unit.name if variable.unit else ""
+    others = f" (and {count_noun(count - 1, 'more element')})" if count > 1 else ""
+    span = f"outside its limits {limits[0]:.4g} ... {limits[1]:.4g} {unit}"
+    if not share:
+        cause = probable_cause(value, limits, unit, "the value, or a value of the vehicle is wrong")
+        return f"{end}{others} is set to {value:.4g} {unit}, {span}; {cause}"
+    other = "the controller saturates, or a value of the vehicle is wrong"
+    cause = probable_cause(value, limits, unit, other)
+    part = f"in {100 * share:.0f} % of the run, up to {value:.4g} {unit}"
+    return f"{end}{others} is {span} {part}; {cause}"
 
 
 #: share of the rows from which on an input outside its limits causes a warning
@@ -161,7 +151,7 @@ class _Excess(NamedTuple):
     Attributes:
         end: The element.
         variable: The input.
-        share: Share of the rows.
+        share: Share of the rows; 0 for a value that is set.
         extreme: Value outside the limits with the largest magnitude.
         limits: Lower and upper limit.
     """
@@ -189,10 +179,12 @@ def warn_exceeded_limits(prepared: PreparedRun, recording: Recording) -> None:
         _find_excesses(prepared, recording, known),
         lambda excess: (excess.end.component, excess.variable.name),
     )
-    for text in (
-        *map(str, known.values()),
-        *(_describe_share(list(elements)) for _, elements in excesses),
-    ):
+    texts = list(map(str, known.values()))
+    for _, group in excesses:
+        elements = list(group)
+        # the element that is outside for the longest time
+        texts.append(_describe(max(elements, key=lambda excess: excess.share), len(elements)))
+    for text in texts:
         logging.getLogger("cosim").warning("%s", text)
 
 
@@ -251,22 +243,3 @@ def _fed_values(
         values = factor * recorded[connection.source] + offset
         total = values if total is None else total + values
     return total
-
-
-def _describe_share(elements: list[_Excess]) -> str:
-    """Return the warning about one input, with the element that is outside for the longest time."""
-    worst = max(elements, key=lambda excess: excess.share)
-    unit = worst.variable.unit.name if worst.variable.unit else ""
-    low, high = worst.limits
-    others = f" (and {count_noun(len(elements) - 1, 'more element')})" if len(elements) > 1 else ""
-    cause = probable_cause(
-        worst.extreme,
-        worst.limits,
-        unit,
-        "the controller saturates, or a value of the vehicle is wrong",
-    )
-    return (
-        f"{worst.end}{others} is outside its limits {low:.4g} ... {high:.4g} {unit} in "
-        f"{100 * worst.share:.0f} % of the run, "
-        f"up to {worst.extreme:.4g} {unit}; {cause}"
-    )

@@ -93,14 +93,13 @@ class Document:
         """Return a path whose keys are numbers where the value is a list."""
         value, keys = self.value, []
         for key in path:
-            is_index = isinstance(value, list) and isinstance(key, str) and key.isdecimal()
-            keys.append(int(key) if is_index else key)
-            exists = (
-                keys[-1] in value
-                if isinstance(value, dict)
-                else isinstance(value, list) and keys[-1] in range(len(value))
-            )
-            value = value[keys[-1]] if exists else None
+            if isinstance(value, list) and isinstance(key, str) and key.isdecimal():
+                key = int(key)
+            keys.append(key)
+            try:
+                value = value[key]
+            except (LookupError, TypeError):
+                value = None
         return tuple(keys)
 
     def refuse_objects(self, reason: str, classes: bool) -> None:
@@ -203,13 +202,14 @@ def read_document(file: Path) -> Document:
             f'"{file}" is not UTF-8 text: {error.reason} at byte {error.start}'
         ) from None
     parsed = _parse_file(file, text)
-    own: dict[str, Any] = {
-        "problems": [*parsed.problems],
-        "removed": set(),
-        "settings": {},
-        "set_documents": {},
-    }
-    return replace(parsed, value=copy_json(parsed.value), **own)
+    return replace(
+        parsed,
+        value=copy_json(parsed.value),
+        problems=[*parsed.problems],
+        removed=set(),
+        settings={},
+        set_documents={},
+    )
 
 
 @lru_cache(8)  # studies read the same files for each run
@@ -270,9 +270,8 @@ class _JsonParser:
             if result:
                 offset = self.expect(offset, ",", "}")
             if self.text[offset : offset + 1] != '"':
-                comment = (
-                    "; JSON has no comments" if self.text.startswith(("//", "/*"), offset) else ""
-                )
+                is_comment = self.text.startswith(("//", "/*"), offset)
+                comment = "; JSON has no comments" if is_comment else ""
                 raise self.error(offset, f'expected a key in double quotes or "}}"{comment}')
             begin = offset
             raw_key, offset = self.string(offset)
@@ -303,19 +302,17 @@ class _JsonParser:
 
     def expect(self, offset: int, *symbols: str) -> int:
         if self.text[offset : offset + 1] != symbols[0]:
-            end = len(
-                self.text[:offset].rstrip()
-            )  # of the value before, after which a comma is probably missing
+            # end of the value before, after which a comma is probably missing
+            end = len(self.text[:offset].rstrip())
             place = end if symbols[0] == "," and "\n" in self.text[end:offset] else offset
             raise self.error(place, f"expected {' or '.join(map(repr, symbols))}")
         return _skip_whitespace(self.text, offset + 1)
 
     def string(self, offset: int) -> tuple[str, int]:
         try:
-            text, end = _DECODER.raw_decode(self.text, offset)
+            return _DECODER.raw_decode(self.text, offset)
         except json.JSONDecodeError as error:
             raise self.error(error.pos, error.msg) from None
-        return text, end
 
     def clean(self, text: str, path: JsonPath) -> str:
         """Return the permitted part of a text.
@@ -379,28 +376,15 @@ def missing_value(document: Any, pointer: str) -> str:
     """
     keys = pointer_keys(pointer)
     value, depth = find_value(document, keys)
-    return (
-        "the scenario has no "
-        f'"/{"/".join(keys[: depth + 1])}"{_present_keys(keys[:depth], keys[depth], value)}'
-    )
-
-
-def _present_keys(place: Sequence[str], key: str, value: Any) -> str:
-    """Return a hint for the end of a message.
-
-    The key at a place that another one probably means, else all keys there.
-    """
-    owner = f'"{shorten(place[-1])}"' if place else "it"
+    text = f'the scenario has no "/{"/".join(keys[: depth + 1])}"'
+    owner = f'"{shorten(keys[depth - 1])}"' if depth else "it"
     if isinstance(value, list):
-        return f"; {owner} has {count_noun(len(value), 'element')}"
+        return f"{text}; {owner} has {count_noun(len(value), 'element')}"
     if not isinstance(value, dict) or not value:
-        return ""
-    near = nearest_name(key, (*value, *_OPTIONAL_OBJECTS))
-    return (
-        f'; did you mean "{near}"?'
-        if near
-        else f"; {owner} has: {abbreviate_names(map(shorten, value), 12)}"
-    )
+        return text
+    if near := nearest_name(keys[depth], (*value, *_OPTIONAL_OBJECTS)):
+        return f'{text}; did you mean "{near}"?'
+    return f"{text}; {owner} has: {abbreviate_names(map(shorten, value), 12)}"
 
 
 def set_value(document: Any, pointer: str, value: Any) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from functools import cached_property
 from itertools import chain
 from typing import NamedTuple
@@ -71,7 +71,10 @@ class OutputFinder:
         """Return the outermost name of an input: that of a port if a nested system publishes it."""
         *systems, member = end.component.split(".")
         scalar = end.scalar
-        while systems and (port := _port_of(self._node(systems), f"{member}.{scalar}")):
+        nodes = [self._root]
+        for system in systems:
+            nodes.append(nodes[-1].children[system])
+        while systems and (port := _port_of(nodes.pop(), f"{member}.{scalar}")):
             member, scalar = systems.pop(), port
         return Place(".".join(systems), member, scalar)
 
@@ -135,12 +138,6 @@ class OutputFinder:
     def _nested_systems(self) -> Set[str]:
         """Full names of all nested systems, of which connections name ports."""
         return {node.prefix for node in self._root.walk()}
-
-    def _node(self, systems: Iterable[str]) -> Node:
-        node = self._root
-        for system in systems:
-            node = node.children[system]
-        return node
 
     @cached_property
     def _outputs(self) -> Mapping[Place, Variable]:
@@ -321,20 +318,14 @@ def _hint(finder: OutputFinder, count: int, place: Place, variable: Variable) ->
     The output with the name nearest to that of the first input.
     """
     keep = "they keep their start values" if count > 1 else "it keeps its start value"
-    similar = _similar_output(finder, place, variable)
-    nearest = f"; the output nearest by name is {similar}" if similar else ""
-    return (
-        f': {keep} until a connection feeds or "parameters" set '
-        f"{'them' if count > 1 else 'it'}{nearest}"
-    )
-
-
-def _similar_output(finder: OutputFinder, place: Place, variable: Variable) -> Place | None:
-    """Return the output of the same quantity with the most similar name."""
     outputs = {
         output.scalar: output
         for output, other in finder.outputs_beside(place)
         if not incompatibility(other, variable)
     }
     near = difflib.get_close_matches(place.scalar, outputs, n=1)
-    return outputs[near[0]] if near else None
+    nearest = f"; the output nearest by name is {outputs[near[0]]}" if near else ""
+    return (
+        f': {keep} until a connection feeds or "parameters" set '
+        f"{'them' if count > 1 else 'it'}{nearest}"
+    )

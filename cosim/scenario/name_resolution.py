@@ -248,16 +248,8 @@ def vector_names(variables: Mapping[str, Variable], prefix: str) -> list[str]:
     )
 
 
-class Assignment(NamedTuple):
-    """Assignment of a value to the variable `name` in the system `node`.
-
-    `where` is its place, for messages.
-    """
-
-    node: Node
-    name: str
-    value: Any
-    where: str
+#: system, name of the variable in it, value, and place for messages
+Assignment = tuple[Node, str, Any, str]
 
 
 def iterate_assignments(root: Node, settings: Mapping[str, Any]) -> Iterator[Assignment]:
@@ -268,14 +260,10 @@ def iterate_assignments(root: Node, settings: Mapping[str, Any]) -> Iterator[Ass
     for node in root.walk():
         for name, spec in node.spec.components.items():
             for variable, value in spec.parameters.items():
-                yield Assignment(
-                    node,
-                    f"{name}.{variable}",
-                    value,
-                    node.where("components", name, "parameters", variable),
-                )
+                where = node.where("components", name, "parameters", variable)
+                yield node, f"{name}.{variable}", value, where
     for name, value in settings.items():
-        yield Assignment(root, name, value, f'setting "{name}"')
+        yield root, name, value, f'setting "{name}"'
 
 
 def values_by_component(root: Node, settings: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

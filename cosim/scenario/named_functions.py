@@ -48,10 +48,8 @@ def find_function_problems(
         names: set[str] = set()
         for i, function in functions:
             if function.name in names:
-                yield Problem(
-                    f'the name "{function.name}" is used more than once',
-                    root.where(kind, i, "name"),
-                )
+                text = f'the name "{function.name}" is used more than once'
+                yield Problem(text, root.where(kind, i, "name"))
             names.add(function.name)
     if spec.scene and (text := function_problem(spec.scene, root.folder)):
         yield Problem(text, root.where("scene"))
@@ -70,9 +68,15 @@ def function_problem(spec: CallSpec, folder: Path) -> str:
     """
     if text := definition_problem(spec, folder):
         return text
-    return _argument_problem(
-        spec.python.rpartition(":")[2], function_definition(spec, folder).args, spec.arguments
-    )
+    name, known = spec.python.rpartition(":")[2], declared_arguments(spec, folder)
+    takes_all = function_definition(spec, folder).args.kwarg
+    for argument in spec.arguments:
+        if argument not in known and not takes_all:
+            return f'"{name}" takes no argument "{argument}"{did_you_mean(argument, known)}'
+    required = [argument for argument, is_required in known.items() if is_required]
+    missing = [argument for argument in required if argument not in spec.arguments]
+    plural = "s" * (len(missing) > 1)
+    return f'"{name}" needs the argument{plural} {", ".join(missing)}' if missing else ""
 
 
 def definition_problem(spec: CallSpec, folder: Path) -> str:
@@ -91,12 +95,10 @@ def definition_problem(spec: CallSpec, folder: Path) -> str:
         return f'expected "file.py:function" or "package.module:function", found "{spec.python}"'
     path = source_path(file, folder)
     if path is None or not is_file(path):
-        return (
-            f'{"file" if file.endswith(".py") else "module"} "{file}" does not '
-            f"exist{nearest_file(path) if path else ''}"
-        )
+        kind = "file" if file.endswith(".py") else "module"
+        return f'{kind} "{file}" does not exist{nearest_file(path) if path else ""}'
     try:
-        functions = function_definitions(path)
+        functions = function_definitions(path, name)
     except SyntaxError as error:
         return f'"{file}" is not valid Python: {error.msg} (line {error.lineno})'
     if name not in functions:
@@ -107,9 +109,23 @@ def definition_problem(spec: CallSpec, folder: Path) -> str:
 def declared_arguments(spec: CallSpec, folder: Path) -> dict[str, bool]:
     """Return the keyword arguments that a function declares, and whether each is required.
 
-    The first argument is left out.
+    The first argument, which is the result or the scenario, is left out.
     """
-    return _declared_arguments(function_definition(spec, folder).args)
+    declared = function_definition(spec, folder).args
+    positional = [argument.arg for argument in (*declared.posonlyargs, *declared.args)]
+    first_default = len(positional) - len(declared.defaults)
+    arguments = {name: i < first_default for i, name in enumerate(positional) if i}
+    for argument, default in zip(declared.kwonlyargs, declared.kw_defaults, strict=True):
+        arguments[argument.arg] = default is None
+    return arguments
+
+
+def _given_parameters(spec: CallSpec, folder: Path) -> Iterator[tuple[ast.arg, Any]]:
+    """Yield (parameter, value) of the arguments that a scenario gives."""
+    declared = function_definition(spec, folder).args
+    for parameter in (*declared.posonlyargs, *declared.args, *declared.kwonlyargs):
+        if parameter.arg in spec.arguments:
+            yield parameter, spec.arguments[parameter.arg]
 
 
 def signal_problems(root: Node, kind: str, signals: Collection[str]) -> Iterator[Problem]:
@@ -135,32 +151,23 @@ def unknown_signals(
     spec: CallSpec, root: Node, signals: Collection[str]
 ) -> Iterator[tuple[str, str]]:
     """Yield (parameter, message) of every argument that names no recorded signal."""
-    declared = function_definition(spec, root.folder).args
-    for parameter in (*declared.posonlyargs, *declared.args, *declared.kwonlyargs):
-        value, kinds = spec.arguments.get(parameter.arg), _annotation_names(parameter.annotation)
+    for parameter, value in _given_parameters(spec, root.folder):
         if not isinstance(value, str):
             continue
+        kinds = _annotation_names(parameter.annotation)
         if "Signal" in kinds and value not in signals:
             yield parameter.arg, f'no signal "{value}" is recorded{_reason(value, root, signals)}'
         if "Prefix" in kinds and not any(
             name.startswith((f"{value}.", f"{value}[")) for name in signals
         ):
-            yield (
-                parameter.arg,
-                (
-                    f'no signal below "{value}" is '
-                    f"recorded{_reason(value, root, _signal_prefixes(signals))}"
-                ),
-            )
+            reason = _reason(value, root, _signal_prefixes(signals))
+            yield parameter.arg, f'no signal below "{value}" is recorded{reason}'
 
 
 def wrong_types(spec: CallSpec, folder: Path) -> Iterator[tuple[str, str]]:
     """Yield (parameter, message) of every argument whose value does not have the annotated type."""
-    declared = function_definition(spec, folder).args
-    for parameter in (*declared.posonlyargs, *declared.args, *declared.kwonlyargs):
-        if parameter.arg in spec.arguments and (
-            text := argument_problem(parameter.annotation, spec.arguments[parameter.arg])
-        ):
+    for parameter, value in _given_parameters(spec, folder):
+        if text := argument_problem(parameter.annotation, value):
             yield parameter.arg, text
 
 
@@ -187,22 +194,17 @@ def kpi_name_problem(kpi: str, kpis: Sequence[FunctionSpec], folder: Path) -> st
     literals.
     """
     name, _, key = kpi.partition(".")
-    values = {spec.name: _value_names(spec, folder) for spec in kpis}
+    values: dict[str, list[str]] = {}
+    for spec in [each for each in kpis if each.name == name] or kpis:
+        values[spec.name] = []
+        if not definition_problem(spec, folder):
+            values[spec.name] = kpi_value_names(function_definition(spec, folder))
     if name in values and (not values[name] or key.partition("[")[0] in values[name]):
         return ""
-    own = {name: values[name]} if name in values else values
     known: list[str] = []
-    for each, names in own.items():
+    for each, names in values.items():
         known += [f"{each}.{value}" for value in names] or [each]
     return f'no KPI "{kpi}"{kpi_hint(kpi.partition("[")[0], known)}'
-
-
-def _value_names(spec: FunctionSpec, folder: Path) -> list[str]:
-    return (
-        []
-        if definition_problem(spec, folder)
-        else kpi_value_names(function_definition(spec, folder))
-    )
 
 
 def _annotation_names(annotation: ast.expr | None) -> set[str]:
@@ -239,37 +241,3 @@ def load_function(reference: str, folder: Path) -> Callable[..., Any]:
         else getattr(import_module(module), name)
     )
     return function
-
-
-def _argument_problem(name: str, declared: ast.arguments, given: Collection[str]) -> str:
-    """Return the problem of the keyword arguments `given`, or "".
-
-    The first argument is the result or the scenario.
-    """
-    known = _declared_arguments(declared)
-    for argument in given:
-        if argument not in known and declared.kwarg is None:
-            return f'"{name}" takes no argument "{argument}"{did_you_mean(argument, known)}'
-    missing = [
-        argument for argument, is_required in known.items() if is_required and argument not in given
-    ]
-    return (
-        f'"{name}" needs the argument{"s" * (len(missing) > 1)} {", ".join(missing)}'
-        if missing
-        else ""
-    )
-
-
-def _declared_arguments(declared: ast.arguments) -> dict[str, bool]:
-    """Return the names of all arguments but the first, and whether each is required."""
-    positional = [argument.arg for argument in (*declared.posonlyargs, *declared.args)]
-    first_default = len(positional) - len(declared.defaults)
-    keywords = zip(
-        (argument.arg for argument in declared.kwonlyargs), declared.kw_defaults, strict=True
-    )
-    required = {name: i < first_default for i, name in enumerate(positional)} | {
-        name: default is None for name, default in keywords
-    }
-    return {
-        name: is_required for name, is_required in required.items() if name not in positional[:1]
-    }

@@ -40,17 +40,24 @@ def describe_system(
         sources: Source of each component.
         solvers: Solver of each Model Exchange FMU, by name of the component.
     """
-    return {
-        "components": [
-            _describe_component(system, name, sources[name])
-            | ({"solver": solvers[name]} if name in solvers else {})
-            for name in system.components
-        ],
-        "stages": _describe_stages(system.stages),
-        "connections": [
-            _describe_connection(system, connection) for connection in system.connections
-        ],
-    }
+    components: list[dict[str, Any]] = []
+    for name, component in system.components.items():
+        period = system.periods.get(name)
+        entry = {
+            "name": name,
+            "origin": sources[name],
+            "inputs": len(scalars_of(component.variables, "input")),
+            "outputs": len(scalars_of(component.variables, "output")),
+            "period": None if period is None else float(period),
+        }
+        components.append(entry | ({"solver": solvers[name]} if name in solvers else {}))
+    connections: list[list[str]] = []
+    for each in system.connections:
+        unit = system.find_element(each.source).variable.unit
+        ends = [str(each.source), str(each.target)]
+        connections.append([*ends, unit.name if unit else "", connection_notes(system, each)])
+    stages = _describe_stages(system.stages)
+    return {"components": components, "stages": stages, "connections": connections}
 
 
 def describe_software() -> RunMetadata:
@@ -72,18 +79,6 @@ def _versions() -> dict[str, str]:
     return versions
 
 
-def _describe_component(system: System, name: str, source: str) -> dict[str, Any]:
-    variables = system.components[name].variables
-    period = system.periods.get(name)
-    return {
-        "name": name,
-        "origin": source,
-        "inputs": len(scalars_of(variables, "input")),
-        "outputs": len(scalars_of(variables, "output")),
-        "period": None if period is None else float(period),
-    }
-
-
 def _describe_stages(stages: Iterable[Stage]) -> list[list[Any]]:
     return [list(map(_describe_member, stage)) for stage in stages]
 
@@ -96,21 +91,13 @@ def _describe_member(member: str | Group) -> Any:
     )
 
 
-def _describe_connection(system: System, connection: Connection) -> list[str]:
-    unit = system.find_element(connection.source).variable.unit
-    notes = connection_notes(system, connection)
-    return [str(connection.source), str(connection.target), unit.name if unit else "", notes]
-
-
 def connection_notes(system: System, connection: Connection) -> str:
     """Return the delay and all conversions of a connection as text, such as "delay 1, deg to rad".
 
     "" for a plain copy.
     """
-    source, target = (
-        system.find_element(connection.source).variable,
-        system.find_element(connection.target).variable,
-    )
+    ends = (connection.source, connection.target)
+    source, target = (system.find_element(end).variable for end in ends)
     notes = [f"delay {connection.delay}"] if connection.delay else []
     notes += [connection.interpolation] if connection.interpolation != "hold" else []
     if source.unit and target.unit and unit_conversion(source, target) != (1.0, 0.0):

@@ -47,7 +47,9 @@ def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
     yield from _late_kpis(prepared)
     if prepared.plan.end_warning:
         yield Problem(prepared.plan.end_warning, prepared.root.where("stop_time"))
-    yield from _missing_connections(prepared)
+    root, unconnected = prepared.root, unconnected_inputs(prepared)
+    for name, text in find_missing_connections(root, prepared.system, unconnected):
+        yield Problem(text, root.where_component(name) or root.where("connections"))
     yield from _double_conversions(prepared)
     yield from _large_steps(prepared)
     for file in prepared.component_factory.fmus.values():
@@ -55,15 +57,6 @@ def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
             yield Problem(file.run_warning)
         if changed := changed_sources_warning(file):
             yield Problem(changed)
-
-
-def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield a warning for each component that probably lacks a connection."""
-    for name, text in find_missing_connections(
-        prepared.root, prepared.system, unconnected_inputs(prepared)
-    ):
-        root = prepared.root
-        yield Problem(text, root.where_component(name) or root.where("connections"))
 
 
 def _double_conversions(prepared: PreparedRun) -> Iterator[Problem]:

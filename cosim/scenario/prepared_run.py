@@ -147,24 +147,21 @@ class PreparedRun:
 
     @property
     def origin(self) -> RunMetadata:
-        """Name, content and file of the scenario, and the caller's values of variables."""
-        return {
-            "name": self.spec.name,
-            "scenario": self._resolved_document(),
-            "scenario_file": str(self.document.file.resolve()),
-            "parameters": dict(self.assignments),
-        }
+        """Name, content and file of the scenario, and the caller's values of variables.
 
-    def _resolved_document(self) -> dict[str, Any]:
-        """Return the expanded scenario with the values of all arguments.
-
-        Functions that are left out do not appear.
+        The content is expanded and has the values of all arguments. Functions that are left out do
+        not appear.
         """
         functions = self.spec.model_dump(
             include={"kpis", "figures", "scene"}, exclude_defaults=True, by_alias=True
         )
         value: dict[str, Any] = self.document.value
-        return {key: functions.get(key, item) for key, item in value.items()}
+        return {
+            "name": self.spec.name,
+            "scenario": {key: functions.get(key, item) for key, item in value.items()},
+            "scenario_file": str(self.document.file.resolve()),
+            "parameters": dict(self.assignments),
+        }
 
     def files(self) -> dict[str, Path]:
         """Return all files that the run depends on, by their path from the scenario's folder.
@@ -271,7 +268,8 @@ def load(
     with watch.measure("load_seconds"):
         with watch.measure("parse_seconds"):
             loaded = load_scenario(scenario, settings, settings_folder)
-        if isolation == "fmu" or sandbox:
+        isolate_fmus = isolation == "fmu" or sandbox
+        if isolate_fmus:
             reason = (
                 "expected a file, because Python objects exist in this process only; set "
                 '"isolation" of single FMUs instead'
@@ -280,9 +278,7 @@ def load(
         deadlines = Deadlines(**loaded.spec.deadlines.model_dump())
         if journal := current_journal():
             journal.deadlines = deadlines
-        factory = ComponentFactory(
-            Isolation(deadlines, sandbox), isolation == "fmu" or sandbox, loaded_fmus
-        )
+        factory = ComponentFactory(Isolation(deadlines, sandbox), isolate_fmus, loaded_fmus)
         builder = SystemBuilder(loaded, factory)
         try:
             with watch.measure("create_seconds"):
@@ -296,7 +292,7 @@ def load(
         loaded.root,
         builder.spec,
         plan,
-        builder.component_factory,
+        factory,
         builder.left_out,
         loaded.assignments,
         watch.seconds,

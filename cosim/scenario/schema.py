@@ -74,10 +74,8 @@ class ConnectionSpec(Spec):
     model_config = ConfigDict(json_schema_extra=_CONNECTION_RULES)
 
     sources: NameList = key(
-        (
-            'output "component.variable", a prefix of outputs, or a pattern; the outputs of a list '
-            "are added"
-        ),
+        'output "component.variable", a prefix of outputs, or a pattern; the outputs of a list '
+        "are added",
         "plant.uav",
         alias="from",
     )
@@ -85,10 +83,8 @@ class ConnectionSpec(Spec):
         'input "component.variable", a prefix of inputs, or a pattern', "uav.vehicle", alias="to"
     )
     gain: Gain = key(
-        (
-            "factor that is applied after the conversion of units; a list has one for each output "
-            "of a sum"
-        ),
+        "factor that is applied after the conversion of units; a list has one for each output "
+        "of a sum",
         -1.0,
         default=1.0,
     )
@@ -96,10 +92,8 @@ class ConnectionSpec(Spec):
         "value that is added after the gain", 0.5, unit="that of the input", default=0.0
     )
     convert: bool = key(
-        (
-            "convert Booleans (0 or 1) and all integers to floating-point numbers; above 2^53 they "
-            "are rounded"
-        ),
+        "convert Booleans (0 or 1) and all integers to floating-point numbers; above 2^53 they "
+        "are rounded",
         True,
         default=False,
     )
@@ -175,10 +169,8 @@ class AlgorithmSpec(Spec):
 
     kind: Literal["staged"] = key("the stages step one after the other", "staged", default="staged")
     stages: list[list[Name]] | None = key(
-        (
-            "names of components, each in exactly one stage; default: one stage for each "
-            "component, ordered by their dependencies"
-        ),
+        "names of components, each in exactly one stage; default: one stage for each "
+        "component, ordered by their dependencies",
         [["usv", "uav"], ["plant"]],
         default=None,
     )
@@ -191,10 +183,8 @@ class AlgorithmSpec(Spec):
         default="auto",
     )
     iteration: IterationSpec | None = key(
-        (
-            "repeat the stages in every macro step until they converge; all components must save "
-            "and restore states"
-        ),
+        "repeat the stages in every macro step until they converge; all components must save "
+        "and restore states",
         {"tolerance": 1e-9, "limit": 50},
         default=None,
     )
@@ -294,10 +284,8 @@ class SystemSpec(Spec):
         "connections of outputs to inputs", [{"from": "plant.usv", "to": "usv.vehicle"}], default=[]
     )
     algorithm: AlgorithmSpec | None = key(
-        (
-            "order of execution; default: the components step one after the other, ordered by "
-            "their dependencies"
-        ),
+        "order of execution; default: the components step one after the other, ordered by "
+        "their dependencies",
         {"kind": "staged", "stages": [["usv", "uav"], ["plant"]]},
         default=None,
     )
@@ -324,18 +312,14 @@ class ScenarioSpec(SystemSpec):
     )
     start_time: Seconds = key("time at the start of the run", 0.0, unit="s", default=Fraction(0))
     stop_time: Seconds = key(
-        (
-            "stop time; the run ends at the last whole multiple of the step size and of all "
-            "periods until then"
-        ),
+        "stop time; the run ends at the last whole multiple of the step size and of all "
+        "periods until then",
         40.0,
         unit="s",
     )
     step_size: Period = key(
-        (
-            "macro step: time between two communication points, as a number or a fraction such as "
-            '"1/60"'
-        ),
+        "macro step: time between two communication points, as a number or a fraction such as "
+        '"1/60"',
         0.01,
         unit="s",
     )

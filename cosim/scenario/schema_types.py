@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
@@ -47,17 +48,12 @@ class PlacedError(ValueError):
 
 
 def _parse_time(value: Any) -> Fraction:
-    is_time = (
-        re.fullmatch(_TIME_PATTERN, value)
-        if isinstance(value, str)
-        else isinstance(value, int | float)
-    )
-    if isinstance(value, bool) or not is_time:
-        raise ValueError(_EXPECTED_TIME)
-    try:
-        return exact_fraction(value)
-    except (ValueError, ZeroDivisionError):
-        raise ValueError(_EXPECTED_TIME) from None
+    is_text = isinstance(value, str) and re.fullmatch(_TIME_PATTERN, value)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    with suppress(ValueError, ZeroDivisionError):
+        if is_text or is_number:
+            return exact_fraction(value)
+    raise ValueError(_EXPECTED_TIME)
 
 
 def hint_at_quotes(value: Any, accepts: Callable[[Any], bool]) -> str:
@@ -73,16 +69,15 @@ def hint_at_quotes(value: Any, accepts: Callable[[Any], bool]) -> str:
     )
 
 
-def _check_positive(value: Fraction) -> Fraction:
-    if value <= 0:
-        raise ValueError("expected a positive number of seconds")
-    return value
+def _require(accepts: Callable[[Any], bool], expected: str) -> Callable[[Any], Any]:
+    """Return a validator that refuses what `accepts` does not accept."""
 
+    def check(value: Any) -> Any:
+        if not accepts(value):
+            raise ValueError(f"expected {expected}")
+        return value
 
-def _check_not_negative(value: Fraction) -> Fraction:
-    if value < 0:
-        raise ValueError("expected 0 s or more")
-    return value
+    return check
 
 
 def _check_value(value: Any) -> Any:
@@ -94,21 +89,9 @@ def _check_value(value: Any) -> Any:
     return value
 
 
-def _check_bool_or_number(value: Any) -> Any:
-    if not isinstance(value, bool | int | float):
-        raise ValueError("expected a number, true or false")
-    return value
-
-
 def _as_integer(value: Any) -> Any:
     """Return an integral float such as 1.0 as integer, which it is in JSON Schema."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
-
-
-def _check_auto_or_bool(value: Any) -> Any:
-    if value != "auto" and not isinstance(value, bool):
-        raise ValueError('expected "auto", true or false')
-    return value
 
 
 def _as_list(value: Any) -> Any:
@@ -122,42 +105,27 @@ def _check_gain(value: Any) -> Any:
     return value
 
 
+def _time_schema(pattern: str, **limits: float) -> WithJsonSchema:
+    """Return the JSON Schema of a time: a number within limits, or a text with a pattern."""
+    number = {"type": "number", **limits, "maximum": MAX_TIME}
+    return WithJsonSchema({"anyOf": [number, {"type": "string", "pattern": pattern}]})
+
+
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 Seconds = Annotated[
     Fraction,
     BeforeValidator(_parse_time),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "number", "minimum": -MAX_TIME, "maximum": MAX_TIME},
-                {"type": "string", "pattern": _TIME_PATTERN},
-            ]
-        }
-    ),
+    _time_schema(_TIME_PATTERN, minimum=-MAX_TIME),
 ]
 Period = Annotated[
     Seconds,
-    AfterValidator(_check_positive),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "number", "exclusiveMinimum": 0, "maximum": MAX_TIME},
-                {"type": "string", "pattern": _POSITIVE_TIME_PATTERN},
-            ]
-        }
-    ),
+    AfterValidator(_require(lambda value: value > 0, "a positive number of seconds")),
+    _time_schema(_POSITIVE_TIME_PATTERN, exclusiveMinimum=0),
 ]
 Duration = Annotated[
     Seconds,
-    AfterValidator(_check_not_negative),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "number", "minimum": 0, "maximum": MAX_TIME},
-                {"type": "string", "pattern": rf"^\+?{_UNSIGNED_TIME}"},
-            ]
-        }
-    ),
+    AfterValidator(_require(lambda value: value >= 0, "0 s or more")),
+    _time_schema(rf"^\+?{_UNSIGNED_TIME}", minimum=0),
 ]
 Gain = Annotated[
     float | list[float],
@@ -167,7 +135,9 @@ Gain = Annotated[
 Integer = Annotated[int, BeforeValidator(_as_integer)]
 BoolOrNumber = Annotated[
     bool | int | float,
-    BeforeValidator(_check_bool_or_number),
+    BeforeValidator(
+        _require(lambda value: isinstance(value, bool | int | float), "a number, true or false")
+    ),
     WithJsonSchema({"type": ["number", "boolean"]}),
 ]
 
@@ -186,7 +156,9 @@ Value = Annotated[
 ]
 AutoOrBool = Annotated[
     Literal["auto"] | bool,
-    BeforeValidator(_check_auto_or_bool),
+    BeforeValidator(
+        _require(lambda value: value == "auto" or isinstance(value, bool), '"auto", true or false')
+    ),
     WithJsonSchema({"enum": ["auto", True, False]}),
 ]
 NameList = Annotated[

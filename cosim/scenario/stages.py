@@ -78,14 +78,22 @@ class StagePlanner:
         """
         if "components" in node.invalid_keys:
             return ()
-        listed = (
-            node.spec.algorithm.stages if node.spec.algorithm and not node.has_wrong_names else None
-        )
-        stages = [[name] for name in self._automatic_order(node)] if listed is None else listed
+        algorithm = None if node.has_wrong_names else node.spec.algorithm
+        stages = algorithm.stages if algorithm else None
+        if stages is None:
+            stages = [[name] for name in self._automatic_order(node)]
         result: list[Stage] = []
         for stage in filter(None, stages):
-            valid = [name for name in stage if name not in node.invalid_components]
-            result.append(tuple(self._stage_member(node, name) for name in valid))
+            members: list[str | Group] = []
+            for name in stage:
+                if name in node.children:
+                    spec = node.children[name].spec
+                    inner = self._stages(node.children[name]), parallel_mode(spec)
+                    group = Group(node.full_name(name), *inner, _iteration_settings(spec))
+                    members.append(group)
+                elif name not in node.invalid_components:
+                    members.append(node.full_name(name))
+            result.append(tuple(members))
         return tuple(result)
 
     def _automatic_order(self, node: Node) -> list[str]:
@@ -106,17 +114,6 @@ class StagePlanner:
             for inner in ordered_groups({member: direct[member] for member in group}):
                 order += inner
         return order
-
-    def _stage_member(self, node: Node, name: str) -> str | Group:
-        if name in node.children:
-            child = node.children[name]
-            return Group(
-                node.full_name(name),
-                self._stages(child),
-                parallel_mode(child.spec),
-                _iteration_settings(child.spec),
-            )
-        return node.full_name(name)
 
 
 def _direct_inputs(component: Component) -> frozenset[str] | None:

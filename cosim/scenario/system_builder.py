@@ -45,9 +45,10 @@ class SystemBuilder:
     def __init__(self, scenario: Scenario, factory: ComponentFactory) -> None:
         self.root, self.spec, self.assignments = scenario.root, scenario.spec, scenario.assignments
         self.problems: list[Problem] = list(scenario.problems)
-        self.component_factory = factory
+        self._component_factory = factory
         self.components: dict[str, Component] = {}
-        self._variables_by_component: dict[str, Mapping[str, Variable]] = {}
+        #: variables of the components by their names, without those of the input profiles
+        self._variables: dict[str, Mapping[str, Variable]] = {}
         #: names with values that were refused, and the systems in which they are used
         self._refused_values: list[tuple[Node, str]] = []
         #: some signals are missing because of other problems
@@ -88,7 +89,7 @@ class SystemBuilder:
         except InputError as error:
             self.problems += located_problems(self.root, error.problems)
         signals = None if self._has_missing_signals else settings.columns
-        resolver = FunctionResolver(self.root, self.components, self.start_values, signals)
+        resolver = FunctionResolver(self.root, self._variables, self.start_values, signals)
         resolved = resolver.resolve(self.spec)
         self.problems += [
             *resolver.problems,
@@ -135,10 +136,11 @@ class SystemBuilder:
                     node.folder,
                     values.get(full_name, {}),
                     node.document.objects.get(("components", name)),
-                    self.component_factory,
+                    self._component_factory,
                 )
                 component = node.spec.components[name].create(creation)
                 self.components[full_name] = component
+                self._variables[full_name] = {each.name: each for each in component.variables}
                 for warning in component.warnings:
                     place = node.where("components", name, *warning.subject)
                     logging.getLogger(component_log.LOGGER_NAME).warning(
@@ -169,15 +171,9 @@ class SystemBuilder:
     def _inputs_of(self, names: Sequence[str]) -> Iterator[Variable]:
         for name in names:
             with suppress(UnknownNameError):
-                for target in (
-                    each
-                    for each in resolve_name(self.root, name, ("inputs",))
-                    if each.component in self.components
-                ):
-                    variables = self._variables(target.component)
-                    yield from filter(
-                        None, map(variables.get, (target.prefix, target.prefix.rpartition("[")[0]))
-                    )
+                for component, prefix in resolve_name(self.root, name, ("inputs",)):
+                    variables = self._variables.get(component, {})
+                    yield from filter(None, map(variables.get, (prefix, prefix.rpartition("[")[0])))
 
     def _assign(
         self,
@@ -191,7 +187,7 @@ class SystemBuilder:
         try:
             for target in resolve_name(node, name, ("parameters", "inputs"), include_inner=True):
                 if target.component in self.components:
-                    variables = self._variables(target.component)
+                    variables = self._variables[target.component]
                     known = values[target.component]
                     known |= check_assignment(
                         target.component,
@@ -206,17 +202,10 @@ class SystemBuilder:
             if str(error):
                 self.problems.append(Problem(str(error), where))
 
-    def _variables(self, name: str) -> Mapping[str, Variable]:
-        if name not in self._variables_by_component:
-            self._variables_by_component[name] = {
-                variable.name: variable for variable in self.components[name].variables
-            }
-        return self._variables_by_component[name]
-
     def _connections(self) -> Iterator[Connection]:
         inputs_with_values: set[Endpoint] = set()
         for name, values in self.start_values.items():
-            for variable in map(self._variables(name).__getitem__, values):
+            for variable in map(self._variables[name].__getitem__, values):
                 inputs_with_values |= {Endpoint(name, slot) for slot in variable.scalar_names}
         wiring = Wiring(self.components, inputs_with_values)
         for node in self.root.walk():
@@ -256,10 +245,8 @@ class SystemBuilder:
         for node in self.root.walk():
             for name, child in node.children.items():
                 for port, inner in child.ports.outputs.items():
-                    where, alias = (
-                        child.where("ports", "outputs", port),
-                        f"{node.full_name(name)}.{port}",
-                    )
+                    where = child.where("ports", "outputs", port)
+                    alias = f"{node.full_name(name)}.{port}"
                     if port in child.spec.components:
                         text = (
                             f'"{port}" is already the name of a component here, so an output port '

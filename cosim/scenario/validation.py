@@ -9,6 +9,7 @@ import json
 import types
 import typing
 from collections.abc import Iterable, Mapping, Sequence
+from functools import reduce
 from itertools import chain, count
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -171,15 +172,11 @@ def _group_problem(
 ) -> Problem:
     """Return one problem for errors with a common cause."""
     (path, detail), *others = group
-    if not others:
-        return Problem(_error_message(kind, path, detail), document.where(path))
-    if detail["type"] == "missing":
+    if others and detail["type"] == "missing":
         names = ", ".join(f'"{each[-1]}"' for each, _ in group)
         return Problem(f"the keys {names} are missing", document.where(path[:-1]))
-    count = count_noun(len(others), "more element")
-    return Problem(
-        f"{_error_message(kind, path, detail)}, and {count} likewise", document.where(path)
-    )
+    further = f", and {count_noun(len(others), 'more element')} likewise" if others else ""
+    return Problem(_error_message(kind, path, detail) + further, document.where(path))
 
 
 def _meant_keys(kind: type[BaseModel], path: Sequence[str | int]) -> list[str]:
@@ -212,12 +209,9 @@ def _error_message(kind: type[BaseModel], path: Sequence[str | int], detail: Any
                 else f"{error}; found {found}{hint}"
             )
         case "dict_type" | "model_type":
-            is_removal = detail["input"] is None and len(path) == 2 and path[0] == "components"
-            hint = (
-                '; a scenario that "extends" this one removes a component by null'
-                if is_removal
-                else ""
-            )
+            hint = ""
+            if detail["input"] is None and len(path) == 2 and path[0] == "components":
+                hint = '; a scenario that "extends" this one removes a component by null'
             return f"expected an object; found {found}{hint}"
         case "string_pattern_mismatch":
             characters = (
@@ -245,14 +239,20 @@ def _shorten_json(value: Any) -> str:
 
 def _remove_key(value: Any, path: Sequence[str | int]) -> None:
     """Remove an unknown key, unless the object that contained it has already been removed."""
+    owner = _owner(value, path)
+    if isinstance(owner, dict):
+        owner.pop(path[-1], None)
+
+
+def _owner(value: Any, path: Sequence[str | int]) -> Any:
+    """Return the object or list with the value at `path`; None if it has been removed."""
     for key in path[:-1]:
         if value is INVALID or not (
             key in value if isinstance(value, dict) else key in range(len(value))
         ):
-            return
+            return None
         value = value[key]
-    if isinstance(value, dict):
-        value.pop(path[-1], None)
+    return value
 
 
 def _replace_invalid(kind: Any, value: Any, path: Sequence[str | int]) -> None:
@@ -260,31 +260,22 @@ def _replace_invalid(kind: Any, value: Any, path: Sequence[str | int]) -> None:
 
     Required keys of the root and elements of lists get a placeholder.
     """
-    root = value
-    for key in path[:-1]:
-        if value is INVALID or not (
-            key in value if isinstance(value, dict) else key in range(len(value))
-        ):
-            return
-        value, kind = value[key], _child_type(kind, key)
-    last = path[-1]
-    if value is root and last in _PLACEHOLDERS:
-        value[last] = copy_json(_PLACEHOLDERS[str(last)])
-    elif isinstance(value, dict):
-        value.pop(last, None)
-    elif isinstance(value, list) and last in range(len(value)):
-        if _model_type(_child_type(kind, last)):
-            value[int(last)] = INVALID
+    owner, last = _owner(value, path), path[-1]
+    if owner is value and last in _PLACEHOLDERS:
+        owner[last] = copy_json(_PLACEHOLDERS[str(last)])
+    elif isinstance(owner, dict):
+        owner.pop(last, None)
+    elif isinstance(owner, list) and last in range(len(owner)):
+        if _model_type(reduce(_child_type, path, kind)):
+            owner[int(last)] = INVALID
         else:
-            del value[int(last)]
+            del owner[int(last)]
 
 
 def _known_keys(kind: Any, path: Sequence[str | int]) -> list[str]:
     """Return the keys that the schema allows at a path."""
-    for key in path:
-        kind = _child_type(kind, key)
-    kind = _model_type(kind)
-    return [field.alias or name for name, field in _fields(kind).items()] if kind else []
+    model = _model_type(reduce(_child_type, path, kind))
+    return [field.alias or name for name, field in _fields(model).items()] if model else []
 
 
 def _fields(model: type[BaseModel]) -> Mapping[str, FieldInfo]:

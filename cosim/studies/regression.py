@@ -110,6 +110,8 @@ class Regression:
         return replace(self._run(), seconds=time.perf_counter() - began)
 
     def _run(self) -> RegressionOutcome:
+        from ..report.runs import read_run
+
         done = self.run_command(
             ["run", str(self.file), "--no-report", "--output-dir", str(self.directory)]
         )
@@ -130,7 +132,8 @@ class Regression:
             summary = "was refused" if done.returncode == 2 else "did not run to its end"
             return RegressionOutcome(self.file.stem, done.returncode, summary, details)
         try:
-            run = _FinishedRun.read(self.file, self.directory)
+            result = read_run(self.directory)
+            run = _FinishedRun(result, result.metadata["scenario"], self.file.parent)
             outcome = self._update_reference(run) if self.update else self._compare(run)
         except CosimError as error:
             return RegressionOutcome(
@@ -148,13 +151,16 @@ class Regression:
 
     def _compare(self, run: _FinishedRun) -> RegressionOutcome:
         from ..api.comparison import reference_changes
+        from ..results.comparison import compare, needed_share
 
         failed = run.failed_checks()
         counts = [(len(run.failed_checks(checks_only=True)), len(run.checks), "check")]
         notes, accept = list[str](), ""
         if run.scenario.get("reference"):
-            comparison = run.compare()
-            notes = [run.margin] if comparison.passed else []
+            compared = (run.result, run.reference, run.tolerances)
+            comparison = compare(*compared)
+            if comparison.passed:
+                notes = [f"{needed_share(*compared):.0%} of the tolerances"]
             notes += run.later_rows()
             counts.append((len(comparison.failures), len(comparison.verdicts), "signal"))
             if not comparison.passed:
@@ -238,13 +244,6 @@ class _FinishedRun:
     scenario: Mapping[str, Any]
     folder: Path
 
-    @classmethod
-    def read(cls, file: Path, directory: Path) -> _FinishedRun:
-        from ..report.runs import read_run
-
-        result = read_run(directory)
-        return cls(result, result.metadata["scenario"], file.parent)
-
     @property
     def checks(self) -> list[dict[str, Any]]:
         checks: list[dict[str, Any]] = self.scenario.get("checks", [])
@@ -291,18 +290,6 @@ class _FinishedRun:
                 "writes it"
             )
         return Result.from_csv(self.reference_path)
-
-    def compare(self) -> Comparison:
-        from ..results.comparison import compare
-
-        return compare(self.result, self.reference, self.tolerances)
-
-    @property
-    def margin(self) -> str:
-        """The share of the tolerances that a passed comparison needs."""
-        from ..results.comparison import needed_share
-
-        return f"{needed_share(self.result, self.reference, self.tolerances):.0%} of the tolerances"
 
     def later_rows(self) -> Iterator[str]:
         """Yield a note if the run continues after the end of the reference."""

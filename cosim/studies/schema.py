@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from itertools import chain, product
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, StringConstraints, model_validator
+from pydantic import StringConstraints, model_validator
 
 from ..core.errors import did_you_mean
 from ..scenario.evaluation_schema import CheckSpec
-from ..scenario.schema_types import Integer, NameList, PlacedError, Spec, key, schema_of
+from ..scenario.schema_types import Integer, NameList, PlacedError, Spec, key
 from .factor_schema import (
     TRIAL_COLUMNS,
     FactorSpec,
@@ -393,8 +393,3 @@ def _unique_names(kind: str, entries: Sequence[FactorSpec | ParameterSpec]) -> l
 
 def _first_repeated(names: Sequence[str]) -> str | None:
     return next((name for i, name in enumerate(names) if name in names[:i]), None)
-
-
-def study_json_schema(kind: type[BaseModel]) -> dict[str, Any]:
-    """Return the JSON Schema (2020-12) of a sweep or tuning file."""
-    return schema_of(kind)

@@ -111,25 +111,16 @@ class Sweep:
         """Raise InputError with all problems of the factors' levels and of the criteria's names."""
         points = islice(self._representatives(), _MAX_CHECKED_POINTS)
         jobs = (self.study.job(point.settings) for point in points)
-        self.study.check_jobs(
-            runner,
-            jobs,
-            () if self._varies_kpis else self.study.unknown_criteria(self._own_criteria),
-        )
+        # names are unknown before the runs if levels change the KPI functions of the scenario
+        names = chain(self.design[0].settings, *self.design.level_settings())
+        varies_kpis = any(name.startswith("/kpis") for name in names)
+        problems = [] if varies_kpis else self.study.unknown_criteria(self._own_criteria)
+        self.study.check_jobs(runner, jobs, problems)
 
     @property
     def _own_criteria(self) -> list[str]:
         """Names of the KPIs in the sweep's own criteria."""
         return [check.kpi for check in self.study_file.spec.success or ()]
-
-    @property
-    def _varies_kpis(self) -> bool:
-        """True if levels change the KPI functions of the scenario.
-
-        Their names are then unknown before the runs.
-        """
-        names = chain(self.design[0].settings, *self.design.level_settings())
-        return any(name.startswith("/kpis") for name in names)
 
     def _representatives(self) -> Iterator[Point]:
         """Yield the first point, and the first point with each further listed level of a factor."""

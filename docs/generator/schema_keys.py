@@ -11,7 +11,8 @@ from markdown_parts import code, page, plain, table
 
 from cosim.export.plant import world_schema
 from cosim.scenario import json_schema
-from cosim.studies.schema import SweepSpec, TuneSpec, WorstCaseSpec, study_json_schema
+from cosim.scenario.schema_types import schema_of
+from cosim.studies.schema import SweepSpec, TuneSpec, WorstCaseSpec
 
 Schema = Mapping[str, Any]
 
@@ -53,9 +54,9 @@ def world_keys_page() -> str:
 def study_keys_page() -> str:
     """Return the page with the keys of sweeps and tunings."""
     sweep, tuning, worst = (
-        study_json_schema(SweepSpec),
-        study_json_schema(TuneSpec),
-        study_json_schema(WorstCaseSpec),
+        schema_of(SweepSpec),
+        schema_of(TuneSpec),
+        schema_of(WorstCaseSpec),
     )
     return page(
         "Sweep and tuning keys",

@@ -257,37 +257,20 @@ def vehicle_parts(vehicle: Any, has_landings: bool = True) -> list[Part]:
     if model.name in DETAILED_MODELS and isinstance(vehicle, str):
         return DETAILED_MODELS[model.name](model)
     if model.visual is not None:
-        return [_mesh_part(model, model.visual)]
+        # the positions of a file's triangles start from the origin of the file
+        centre = model.boat.centre_of_mass if model.boat else (0.0, 0.0, 0.0)
+        corners, colour = tuple(model.visual.ravel().tolist()), YELLOW if model.boat else ORANGE
+        return [Part("mesh", corners, _difference((0.0, 0.0, 0.0), centre), colour)]
     if model.airframe:
         return list(multirotor_parts(model.airframe, model.body))
     if model.craft:
         return list(submerged_parts(model.craft, model.body))
-    parts = list(
-        catamaran_parts(model.body, has_landings) if model.is_vessel else box_parts(model.body)
-    )
-    return [
-        part._replace(position=_difference(part.position, _origin_of_boxes(model)))
-        for part in parts
-    ]
-
-
-def _mesh_part(model: Model, triangles: np.ndarray) -> Part:
-    """Return the triangles of a vehicle file, whose positions start from the origin of the file."""
-    centre = model.boat.centre_of_mass if model.boat else (0.0, 0.0, 0.0)
-    return Part(
-        "mesh",
-        tuple(triangles.ravel().tolist()),
-        _difference((0.0, 0.0, 0.0), centre),
-        YELLOW if model.boat else ORANGE,
-    )
-
-
-def _origin_of_boxes(model: Model) -> Vector:
-    """Return the centre of mass from the origin of the collision shape.
-
-    This origin is that of the file for a floating vessel, and the centre of mass for all others.
-    """
-    return model.boat.centre_of_mass if isinstance(model.boat, SurfaceVessel) else (0.0, 0.0, 0.0)
+    found = catamaran_parts(model.body, has_landings) if model.is_vessel else box_parts(model.body)
+    if not isinstance(model.boat, SurfaceVessel):
+        return list(found)
+    # the collision shape of a floating vessel has the origin of its file, not the centre of mass
+    centre = model.boat.centre_of_mass
+    return [part._replace(position=_difference(part.position, centre)) for part in found]
 
 
 def _difference(a: Vector, b: Vector) -> Vector:
@@ -343,7 +326,11 @@ def multirotor_parts(airframe: Airframe, body: Body) -> Iterator[Part]:
     yield Part("sphere", (0.16 * arm,), (0.8 * hull, 0.0, height - 0.3 * arm), GREY)
     for rotor in airframe.rotors:
         yield from _arm_parts(rotor, airframe.rotor_radius, arm)
-    yield from _leg_parts(body, 0.035 * arm, height)
+    # a leg at each lower corner of the collision boxes
+    for box in body.boxes:
+        corners = sorted(box.corners().tolist(), key=lambda corner: corner[2])
+        for x, y, z in corners[:4]:
+            yield Part("cylinder", (0.035 * arm, height - z), (x, y, (height + z) / 2), GREY)
 
 
 def _arm_parts(rotor: Rotor, radius: float, arm: float) -> Iterator[Part]:
@@ -385,11 +372,3 @@ def rotation_from_z(axis: Vector) -> Quaternion:
         return 1.0, 0.0, 0.0, 0.0
     w = math.sqrt((1 + z) / 2)
     return -y / (2 * w), x / (2 * w), 0.0, w
-
-
-def _leg_parts(body: Body, radius: float, top: float) -> Iterator[Part]:
-    """Yield a leg at each lower corner of the collision boxes."""
-    for box in body.boxes:
-        corners = sorted(box.corners().tolist(), key=lambda corner: corner[2])
-        for x, y, z in corners[:4]:
-            yield Part("cylinder", (radius, top - z), (x, y, (top + z) / 2), GREY)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -26,17 +27,19 @@ from .parts import static_parts, tree_parts, vehicle_parts
 from .solid_renderer import Picture, SolidRenderer, View
 
 
+@dataclass(frozen=True, eq=False)
 class Layer:
     """Picture with transparency, onto which vehicles are blended.
 
-    Args:
+    Attributes:
         colour: Colour premultiplied by alpha, shape (height, width, 3).
         alpha: Opacity in 0 ... 1, shape (height, width).
         depth: Depth (m), shape (height, width); not changed by blending.
     """
 
-    def __init__(self, colour: np.ndarray, alpha: np.ndarray, depth: np.ndarray):
-        self.colour, self.alpha, self.depth = colour, alpha, depth
+    colour: np.ndarray
+    alpha: np.ndarray
+    depth: np.ndarray
 
     @classmethod
     def from_solids(cls, solids: Picture) -> Layer:
@@ -194,18 +197,17 @@ class Scene:
         """
         view = find_camera(camera)(self.mission, rows[-1])
         size = (supersampling * width, supersampling * height)
-        background = self._background(view, size)
+        # the last background is reused for cameras that do not move
+        if self._last_background is None or not self._last_background.fits(view, size):
+            self._last_background = Background(self.static, view, size)
+        background = self._last_background
         below = background.mirrored.copy()
         reflected = self._blend_vehicles(below, view.mirrored(), rows, opacities)
         picture = background.with_reflections(below, reflected)
         self._blend_vehicles(picture, view, rows, opacities)
-        return _downsample(picture.colour, supersampling)
-
-    def _background(self, view: View, size: tuple[int, int]) -> Background:
-        """Return the background of a view; the last one is reused for cameras that do not move."""
-        if self._last_background is None or not self._last_background.fits(view, size):
-            self._last_background = Background(self.static, view, size)
-        return self._last_background
+        blocks = picture.colour.reshape(height, supersampling, width, supersampling, 3)
+        mean: np.ndarray = np.rint(np.clip(blocks.mean(axis=(1, 3)), 0, 1) * 255)
+        return mean.astype(np.uint8)
 
     def _blend_vehicles(
         self, layer: Layer, view: View, rows: Sequence[int], opacities: Sequence[float]
@@ -217,16 +219,13 @@ class Scene:
         height, width = layer.depth.shape
         changed = np.zeros((height, width), bool)
         for row, opacity in zip(rows, opacities, strict=True):
-            self._set_poses(row)
+            for index, vehicle in enumerate(self.mission.vehicles):
+                position = self.mission.position(vehicle, row)
+                orientation = self.mission.orientation(vehicle, row)
+                self.vehicles.set_pose(index, position, orientation)
             picture = self.vehicles.render(view, width, height, shadow=True)
             changed.reshape(-1)[layer.blend(picture, opacity)] = True
         return changed
-
-    def _set_poses(self, row: int) -> None:
-        for index, vehicle in enumerate(self.mission.vehicles):
-            self.vehicles.set_pose(
-                index, self.mission.position(vehicle, row), self.mission.orientation(vehicle, row)
-            )
 
 
 def frames(
@@ -263,12 +262,4 @@ def _static_solids(static: SolidRenderer, view: View, light: Rays) -> Picture:
     height, width = light.along_axis.shape
     picture = static.render(view, width, height)
     add_land(picture, view, light)
-    return picture
-
-
-def _downsample(colour: np.ndarray, factor: int) -> np.ndarray:
-    """Return the mean of each block of `factor` by `factor` pixels, as uint8."""
-    height, width, _ = colour.shape
-    mean = colour.reshape(height // factor, factor, width // factor, factor, 3).mean(axis=(1, 3))
-    picture: np.ndarray = np.rint(np.clip(mean, 0, 1) * 255).astype(np.uint8)
     return picture

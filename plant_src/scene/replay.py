@@ -6,8 +6,8 @@ green, blue in 0 ... 1.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import chain, cycle
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -99,60 +99,45 @@ def _scene(vehicles: Mapping[str, Any], scenario: Mapping[str, Any]) -> Scene:
     colours = {False: cycle(MULTIROTOR_COLOURS), True: cycle(VESSEL_COLOURS)}
     models = {name: default_model(vehicle) for name, vehicle in vehicles.items()}
     has_landings = any(model.airframe for model in models.values())
-    bodies = [
-        _body_scene(name, vehicle, next(colours[models[name].is_vessel]), has_landings)
-        for name, vehicle in vehicles.items()
-    ]
+    bodies, spans, marks = list[Scene](), list[Scene](), list[Scene]()
+    for name, vehicle in vehicles.items():
+        title, is_vessel = _short_name(name), models[name].is_vessel
+        colour = next(colours[is_vessel])
+        bodies.append(
+            {
+                "name": name,
+                "title": title,
+                "colour": colour,
+                "position": [f"{name}.position.{axis}" for axis in "xyz"],
+                "orientation": [f"{name}.orientation.{axis}" for axis in "wxyz"],
+                "parts": [part._asdict() for part in vehicle_parts(vehicle, has_landings)],
+            }
+        )
+        if not is_vessel:
+            signal = f"{name}.contact.touching"
+            spans.append({"signal": signal, "label": f"{title} touches", "colour": colour})
+        for failure in ("crashed", "ditched"):
+            label = f"{title} {failure}"
+            mark = {"signal": f"{name}.{failure}", "label": label, "colour": FAILURE_COLOUR}
+            marks.append({**mark, "on": name})
     vessels = [name for name, model in models.items() if model.is_vessel]
     flying = [name for name in vehicles if name not in vessels]
-    colour_of = {body["name"]: body["colour"] for body in bodies}
+    views = []
+    for vessel in vessels[:MAX_VIEWS]:
+        title = "Deck" if len(vessels) == 1 else f"Deck {_short_name(vessel)}"
+        views.append({"name": title, "on": vessel, **ONBOARD_CAMERA})
     return {
         "bodies": bodies,
-        "views": [
-            {"name": _view_name(vessel, vessels), "on": vessel, **ONBOARD_CAMERA}
-            for vessel in vessels[:MAX_VIEWS]
-        ],
+        "views": views,
         "markers": list(_waypoint_markers(scenario)),
-        "spans": [
-            {
-                "signal": f"{name}.contact.touching",
-                "label": f"{_short_name(name)} touches",
-                "colour": colour_of[name],
-            }
-            for name in flying
-        ],
-        "marks": [*chain.from_iterable(map(_failure_marks, vehicles))],
+        "spans": spans,
+        "marks": marks,
         "plots": _plot_patterns(flying[:1], vessels[:1]),
     }
 
 
-def _failure_marks(name: str) -> Iterator[Scene]:
-    for failure in ("crashed", "ditched"):
-        yield {
-            "signal": f"{name}.{failure}",
-            "label": f"{_short_name(name)} {failure}",
-            "colour": FAILURE_COLOUR,
-            "on": name,
-        }
-
-
 def _short_name(name: str) -> str:
     return name.rpartition(".")[2]
-
-
-def _view_name(vessel: str, vessels: Sequence[str]) -> str:
-    return "Deck" if len(vessels) == 1 else f"Deck {_short_name(vessel)}"
-
-
-def _body_scene(name: str, vehicle: Any, colour: str, has_landings: bool) -> Scene:
-    return {
-        "name": name,
-        "title": _short_name(name),
-        "colour": colour,
-        "position": [f"{name}.position.{axis}" for axis in "xyz"],
-        "orientation": [f"{name}.orientation.{axis}" for axis in "wxyz"],
-        "parts": [part._asdict() for part in vehicle_parts(vehicle, has_landings)],
-    }
 
 
 def _waypoint_markers(scenario: Mapping[str, Any]) -> Iterator[Scene]:
@@ -175,15 +160,11 @@ def _waypoint_markers(scenario: Mapping[str, Any]) -> Iterator[Scene]:
 
 def _plot_patterns(flying: Sequence[str], sailing: Sequence[str]) -> list[list[str]]:
     """Return patterns of signal names, one list for each plot."""
-    return [
-        [*_signals_of(flying, "position.z"), *_signals_of(sailing, "deck.position.z")],
-        [*_signals_of(flying, "velocity.*")],
-        [*_signals_of(flying, "attitude.*")],
-        [*_signals_of(flying, "contact.force")],
-        [*_signals_of(sailing, "attitude.yaw")],
-        [*_signals_of(sailing, "velocity_body.*")],
-    ]
-
-
-def _signals_of(names: Iterable[str], signal: str) -> list[str]:
-    return [f"{name}.{signal}" for name in names]
+    heights = [f"{name}.position.z" for name in flying]
+    heights += [f"{name}.deck.position.z" for name in sailing]
+    plots = [heights]
+    for signal in ("velocity.*", "attitude.*", "contact.force"):
+        plots.append([f"{name}.{signal}" for name in flying])
+    for signal in ("attitude.yaw", "velocity_body.*"):
+        plots.append([f"{name}.{signal}" for name in sailing])
+    return plots

@@ -127,15 +127,12 @@ class SignalFault(SignalComponent):
             self.outputs = self.inputs
             self._history[0] = now, self.inputs
             return
-        self._apply_faults(self._delayed(now))
-
-    def _delayed(self, now: float) -> Sequence[float]:
-        """Return the inputs of one delay ago, or the oldest stored ones."""
+        # the inputs of one delay ago, or the oldest stored ones
         history = self._history
         history.append((now, self.inputs))
         while len(history) > 1 and history[1][0] <= now - self._delay + _TIME_TOLERANCE:
             history.popleft()
-        return history[0][1]
+        self._apply_faults(history[0][1])
 
     def _apply_faults(self, inputs: Sequence[float]) -> None:
         row = self.noise[self._step]

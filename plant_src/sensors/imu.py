@@ -23,7 +23,7 @@ Sources of the default values; [typical] is a common value that no data sheet ha
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from cosim.core.component import Variable
@@ -234,37 +234,23 @@ def _measured_axes(
     return max(-limit, min(limit, x)), max(-limit, min(limit, y)), max(-limit, min(limit, z))
 
 
-def _triad_parameters(kind: str, unit: str, numbers: Mapping[str, float]) -> list[Variable]:
-    # densities have no declared unit: FMI units have integer exponents, unit/sqrt(Hz) does not
-    return [
-        real_parameter(
-            f"{kind}.noise_density",
-            "",
-            numbers["noise_density"],
-            f"of white noise, {unit}/sqrt(Hz)",
-        ),
-        real_parameter(
-            f"{kind}.bias_walk",
-            "",
-            numbers["bias_walk"],
-            f"density that drives the bias, {unit}/s/sqrt(Hz)",
-        ),
-        real_parameter(
-            f"{kind}.correlation_time",
-            "s",
-            numbers["correlation_time"],
-            "of the wandering bias",
-            1e-3,
-        ),
-        real_parameter(
-            f"{kind}.turn_on_bias",
-            unit,
-            numbers["turn_on_bias"],
-            "standard deviation of the bias at turn-on",
-        ),
-        real_parameter(f"{kind}.range", unit, numbers["range"], "largest value that is measured"),
-        array_parameter(f"{kind}.bias", unit, (0.0,) * 3, "constant bias"),
-        array_parameter(
-            f"{kind}.matrix", "1", IDENTITY_MATRIX, "scale and misalignment, row by row"
-        ),
-    ]
+#: parameter of a triad -> unit (None: that of the triad) and description; densities have no
+#: declared unit: FMI units have integer exponents, unit/sqrt(Hz) does not
+_TRIAD_PARAMETERS = {
+    "noise_density": ("", "of white noise, {unit}/sqrt(Hz)"),
+    "bias_walk": ("", "density that drives the bias, {unit}/s/sqrt(Hz)"),
+    "correlation_time": ("s", "of the wandering bias"),
+    "turn_on_bias": (None, "standard deviation of the bias at turn-on"),
+    "range": (None, "largest value that is measured"),
+}
+
+
+def _triad_parameters(kind: str, unit: str, numbers: Mapping[str, float]) -> Iterator[Variable]:
+    for name, (own_unit, text) in _TRIAD_PARAMETERS.items():
+        declared = unit if own_unit is None else own_unit
+        minimum = 1e-3 if declared == "s" else 0.0
+        text = text.format(unit=unit)
+        yield real_parameter(f"{kind}.{name}", declared, numbers[name], text, minimum)
+    yield array_parameter(f"{kind}.bias", unit, (0.0,) * 3, "constant bias")
+    text = "scale and misalignment, row by row"
+    yield array_parameter(f"{kind}.matrix", "1", IDENTITY_MATRIX, text)

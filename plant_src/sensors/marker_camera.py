@@ -153,16 +153,13 @@ class MarkerCamera(SampledSensor):
         for side in ((half, half), (half, -half), (-half, -half), (-half, half)):
             place = add_scaled(deck, 1.0, to_world(attitude, (*side, 0.0)))
             corner = to_camera_axes(eye, camera, place)
-            if corner[2] <= 0 or not self._in_picture(*project(corner, p["focal_length"])):
+            if corner[2] <= 0:
+                return False
+            right, down = project(corner, p["focal_length"])
+            if not (abs(right) <= p["width"] / 2 and abs(down) <= p["height"] / 2):
                 return False
         depth = to_camera_axes(eye, camera, deck)[2]
         return bool(p["focal_length"] * p["marker_size"] >= p["smallest"] * depth)
-
-    def _in_picture(self, right: float, down: float) -> bool:
-        return bool(
-            abs(right) <= self.parameters["width"] / 2
-            and abs(down) <= self.parameters["height"] / 2
-        )
 
     def _position(self, deck: Vector, row: Sequence[float]) -> Vector:
         """Return the measured position (m, body axes) from the true one in camera axes."""

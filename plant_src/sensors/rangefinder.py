@@ -111,20 +111,18 @@ class Rangefinder(SampledSensor):
 
     def measure(self, number: int, elapsed: float) -> Measurement:
         """Return the distance (m) and if it is valid; see `SampledSensor.measure`."""
-        p, true = self.parameters, self._distance()
+        p, attitude = self.parameters, self.inputs[3:7]
+        start = add_scaled(self.inputs, 1.0, to_world(attitude, p["mounting"]))
+        beam = to_world(attitude, self._direction)
+        true = self._distance_to_solids(start, beam)
+        if self._water and start[2] > 0 > beam[2]:
+            true = min(true, -start[2] / beam[2])
         if not p["nearest"] <= true <= p["farthest"]:
             return (p["farthest"],), (False,)
         sigma = max(p["noise_floor"], p["noise_share"] * true)
         return (true + sigma * self.noise[number][0],), (True,)
 
-    def _distance(self) -> float:
-        """Return the true distance (m) along the beam; infinite without an object in reach."""
-        attitude = self.inputs[3:7]
-        start = add_scaled(self.inputs, 1.0, to_world(attitude, self.parameters["mounting"]))
-        beam = to_world(attitude, self._direction)
-        return min(self._to_solids(start, beam), self._to_water(start, beam))
-
-    def _to_solids(self, start: Vector, beam: Vector) -> float:
+    def _distance_to_solids(self, start: Vector, beam: Vector) -> float:
         """Return the distance (m) from `start` (m, world) along a unit vector to the solids."""
         for number, body in enumerate(self._bodies, 1):
             x, y, z, qw, qx, qy, qz = self.inputs[_POSE_SIZE * number : _POSE_SIZE * (number + 1)]
@@ -135,9 +133,6 @@ class Rangefinder(SampledSensor):
         end = add_scaled(start, reach, beam)
         (hit,) = pybullet.rayTest(start, end, physicsClientId=self._client)
         return hit[_HIT_FRACTION] * reach if hit[_HIT_BODY] >= 0 else math.inf
-
-    def _to_water(self, start: Vector, beam: Vector) -> float:
-        return -start[2] / beam[2] if self._water and start[2] > 0 > beam[2] else math.inf
 
     def free(self) -> None:
         """Disconnect the Bullet client."""
@@ -150,18 +145,13 @@ def _read_vessels(reader: JsonReader, vessels: Any) -> dict[str, Sequence[Shape]
     """Return the boxes of each vessel, relative to the centre of its deck."""
     models = {kind: next(iter(variants.values())) for kind, variants in VEHICLE_MODELS.items()}
     valid = [kind for kind, model in models.items() if model.is_vessel]
-    named = reader.read_named_objects(vessels, ("vessels",)).items()
-    return {
-        name: _relative_to_deck(models[reader.choice(kind, ("vessels", name), valid)].body.boxes)
-        for name, kind in named
-    }
-
-
-def _relative_to_deck(boxes: Sequence[Shape]) -> Sequence[Shape]:
-    """Move boxes so that the centre of the top of the first one, the deck, is the origin.
-
-    Poses refer to the deck because the centre of mass of some vessels depends on their payload.
-    """
-    a, b, c = boxes[0].position
-    top = c + boxes[0].half_extents[2]
-    return [box.moved((-a, -b, -top)) for box in boxes]
+    boxes: dict[str, Sequence[Shape]] = {}
+    for name, kind in reader.read_named_objects(vessels, ("vessels",)).items():
+        body = models[reader.choice(kind, ("vessels", name), valid)].body
+        # the centre of the top of the first box, the deck, becomes the origin, because the centre
+        # of mass of some vessels depends on their payload
+        deck = body.boxes[0]
+        x, y, z = deck.position
+        offset = (-x, -y, -z - deck.half_extents[2])
+        boxes[name] = [box.moved(offset) for box in body.boxes]
+    return boxes

@@ -114,18 +114,16 @@ class SignalComponent(Component):
             raise ComponentError(self.name, "set", f"{name} is an output")
         value = _flat_value(variable, value)
         if variable.causality == "input":
-            self._set_input(name, value if isinstance(value, list) else [value])
+            values = value if isinstance(value, list) else [value]
+            first, end = self._ranges["input"][name]
+            self.inputs = (*self.inputs[:first], *values, *self.inputs[end:])
+            struct.pack_into(f"{len(values)}d", self._input_data, 8 * first, *values)
             return
         self.parameters[name] = value
         try:
             self.apply_parameters()
         except ValueError as error:
             raise ComponentError(self.name, "set", f"{name}: {error}") from None
-
-    def _set_input(self, name: str, values: Sequence[float]) -> None:
-        first, end = self._ranges["input"][name]
-        self.inputs = (*self.inputs[:first], *values, *self.inputs[end:])
-        struct.pack_into(f"{len(values)}d", self._input_data, 8 * first, *values)
 
     def get(self, name: str) -> Any:
         """Return the present value of a variable, an array as a flat list."""
@@ -209,15 +207,6 @@ class SignalComponent(Component):
         for name, value in state.items():
             setattr(self, name, deepcopy(value))
         self.apply_parameters()
-
-    def free_state(self, state: Any) -> None:
-        """Do nothing: a state holds no resources."""
-
-    def terminate(self) -> None:
-        """Do nothing: there is nothing to end."""
-
-    def free(self) -> None:
-        """Do nothing: there are no resources."""
 
 
 class SampledSensor(SignalComponent):

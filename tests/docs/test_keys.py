@@ -4,14 +4,15 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from cosim.scenario import json_schema
-from cosim.studies.schema import SweepSpec, TuneSpec, WorstCaseSpec, study_json_schema
+from cosim.scenario.schema_types import schema_of
+from cosim.studies.schema import SweepSpec, TuneSpec, WorstCaseSpec
 
 SCHEMAS = {
     "scenario": json_schema(),
     "nested system": json_schema(nested=True),
-    "sweep": study_json_schema(SweepSpec),
-    "tuning": study_json_schema(TuneSpec),
-    "search for the worst case": study_json_schema(WorstCaseSpec),
+    "sweep": schema_of(SweepSpec),
+    "tuning": schema_of(TuneSpec),
+    "search for the worst case": schema_of(WorstCaseSpec),
 }
 
 

@@ -5,7 +5,7 @@ import pytest
 from packed_runs import unpacked
 
 from cosim.core.recording import Recording
-from cosim.report import samples
+from cosim.report import replay as samples
 from cosim.results import Result
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,14 @@ from ...core.errors import InputError
 from ...core.text import count_noun
 from ...report.tables import print_table
 from ..messages import print_json, print_log
-from ..options import PATH, json_option, scenario_argument, settings_option
+from ..options import (
+    Texts,
+    flag_option,
+    json_option,
+    path_option,
+    scenario_argument,
+    settings_option,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,18 +59,17 @@ duration_option = click.option(
 @click.option(
     "--require", multiple=True, metavar="NAME=value", help="Value of a signal at the start time."
 )
-@click.option(
+@path_option(
     "--output",
-    type=PATH,
     help="Scenario file to write; it extends SCENARIO by the found values.",
 )
 @json_option("an object with found, parameters, residuals and evaluations")
 def trim(
     scenario: str,
-    settings: tuple[str, ...],
-    free: tuple[str, ...],
-    steady: tuple[str, ...],
-    require: tuple[str, ...],
+    settings: Texts,
+    free: Texts,
+    steady: Texts,
+    require: Texts,
     output: Path | None,
     as_json: bool,
 ) -> int:
@@ -85,20 +91,14 @@ def trim(
     if output:
         _write_scenario(output, scenario, {**given, **found.parameters})
     if as_json:
-        print_json(
-            {
-                "found": found.is_found,
-                "parameters": found.parameters,
-                "residuals": found.residuals,
-                "evaluations": found.evaluations,
-            }
-        )
+        values = {key: getattr(found, key) for key in ("parameters", "residuals", "evaluations")}
+        print_json({"found": found.is_found, **values})
     else:
         _print_trim(found, output)
     return 0 if found.is_found else 3
 
 
-def _numbers(texts: tuple[str, ...]) -> dict[str, float]:
+def _numbers(texts: Texts) -> dict[str, float]:
     """Return the values of --require by name."""
     from ...scenario.settings import parse_settings
 
@@ -164,22 +164,20 @@ def _print_trim(found: Trim, output: Path | None) -> None:
     metavar="NAME",
     help="Component that steps; the others hold their outputs.",
 )
-@click.option("--continuous", is_flag=True, help="Convert the model to continuous time.")
+@flag_option("--continuous", help="Convert the model to continuous time.")
 @click.option(
     "--order",
     type=click.IntRange(min=0),
     help="Largest number of states; default: as many as the responses show.",
 )
-@click.option(
+@path_option(
     "--output",
     "files",
     multiple=True,
-    type=PATH,
     help="File for the model: .json, .csv or .mat.",
 )
-@click.option(
+@path_option(
     "--figures",
-    type=PATH,
     help="Folder for a Bode diagram, the poles and step responses.",
 )
 @json_option(
@@ -188,12 +186,12 @@ def _print_trim(found: Trim, output: Path | None) -> None:
 )
 def linearize(
     scenario: str,
-    settings: tuple[str, ...],
-    inputs: tuple[str, ...],
-    outputs: tuple[str, ...],
+    settings: Texts,
+    inputs: Texts,
+    outputs: Texts,
     at: str | None,
     duration: float | None,
-    components: tuple[str, ...],
+    components: Texts,
     continuous: bool,
     order: int | None,
     files: tuple[Path, ...],
@@ -235,7 +233,15 @@ def linearize(
             click.echo(file)
     _print_notes(model.notes)
     if figures:
-        _draw_model(model, figures, duration)
+        from ...analysis import figures as diagrams
+
+        span = duration or 256 * (model.step or 0.01)
+        _write_figures(
+            figures,
+            bode=lambda: diagrams.draw_bode(model),
+            poles=lambda: diagrams.draw_poles(model),
+            steps=lambda: diagrams.draw_steps(model, span),
+        )
 
 
 def _print_model(model: LinearModel) -> None:
@@ -256,18 +262,6 @@ def _print_model(model: LinearModel) -> None:
         damping = f"{-rate.real / abs(rate):.3f}" if abs(rate) > 1e-9 else ""
         rows.append([f"{pole.real:.6f} {pole.imag:+.6f}i", f"{abs(rate):.4g}", damping])
     print_table(["pole", "natural frequency (rad/s)", "damping"], rows)
-
-
-def _draw_model(model: LinearModel, folder: Path, duration: float | None) -> None:
-    from ...analysis import figures
-
-    span = duration or 256 * (model.step or 0.01)
-    _write_figures(
-        folder,
-        bode=lambda: figures.draw_bode(model),
-        poles=lambda: figures.draw_poles(model),
-        steps=lambda: figures.draw_steps(model, span),
-    )
 
 
 @click.command()
@@ -298,16 +292,16 @@ def _draw_model(model: LinearModel, folder: Path, duration: float | None) -> Non
 @click.option(
     "--amplitude", type=float, help="Largest value that --estimate adds, in the unit of the signal."
 )
-@click.option("--figures", type=PATH, help="Folder for a Bode and a Nyquist diagram.")
+@path_option("--figures", help="Folder for a Bode and a Nyquist diagram.")
 @json_option(
     "an object with time, step, and loops: objects with the margins; phases in rad, gains as "
     "factors"
 )
 def margins(
     scenario: str,
-    settings: tuple[str, ...],
-    components: tuple[str, ...],
-    loops: tuple[str, ...],
+    settings: Texts,
+    components: Texts,
+    loops: Texts,
     at: str | None,
     duration: float | None,
     estimate: str | None,
@@ -350,7 +344,13 @@ def margins(
             raise InputError("--estimate: expected one --loop and an --amplitude")
         _print_estimate(measured[0], scenario, names, at, estimate, amplitude, parameters)
     if figures:
-        _draw_loops(measured, figures)
+        from ...analysis import figures as diagrams
+
+        _write_figures(
+            figures,
+            bode=lambda: diagrams.draw_loop_bode(measured),
+            nyquist=lambda: diagrams.draw_nyquist(measured),
+        )
     return 0 if all(each.stable and each.valid for each in found) else 3
 
 
@@ -362,14 +362,9 @@ def _finite(value: float, form: str) -> str:
     return format(value, form) if value < math.inf else "any"
 
 
-def _is_stable(margins: LoopMargins) -> str:
-    if not margins.valid:
-        return "?"
-    return "yes" if margins.stable else "NO"
-
-
 def _margins_row(each: LoopMargins) -> dict[str, str]:
     """Return the cells of a loop by the names of their columns."""
+    stable = "yes" if each.stable else "NO"
     return {
         "loop": each.loop,
         "gain up (dB)": _decibels(each.gain),
@@ -378,7 +373,7 @@ def _margins_row(each: LoopMargins) -> dict[str, str]:
         "delay (s)": _finite(each.delay, ".4g"),
         "disk": f"{each.disk:.3f}",
         "crossover (rad/s)": "" if math.isnan(each.crossover) else f"{each.crossover:.4g}",
-        "stable": _is_stable(each),
+        "stable": stable if each.valid else "?",
     }
 
 
@@ -429,16 +424,6 @@ def _print_estimate(
     click.echo()
     print_table(
         ["frequency (rad/s)", "estimated (dB)", "(deg)", "linear (dB)", "(deg)", "difference"], rows
-    )
-
-
-def _draw_loops(loops: Sequence[LoopResponse], folder: Path) -> None:
-    from ...analysis import figures
-
-    _write_figures(
-        folder,
-        bode=lambda: figures.draw_loop_bode(loops),
-        nyquist=lambda: figures.draw_nyquist(loops),
     )
 
 

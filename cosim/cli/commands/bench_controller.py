@@ -29,7 +29,15 @@ from ..bench_output import (
 )
 from ..forked_commands import forked_commands
 from ..messages import print_json
-from ..options import PATH, complete_role, complete_scenario, jobs_option, json_option
+from ..options import (
+    Texts,
+    complete_role,
+    complete_scenario,
+    flag_option,
+    jobs_option,
+    json_option,
+    path_option,
+)
 
 if TYPE_CHECKING:
     from ...studies.controller_bench.trials import ControllerTrials, TrialResult
@@ -48,10 +56,9 @@ _COSTS_FILE = "costs.json"
     shell_complete=complete_role,
     help="Role of the controller (see `cosim list roles`), or the path of a role's JSON file.",
 )
-@click.option(
+@flag_option(
     "--all",
     "with_shipped",
-    is_flag=True,
     help="Also benchmark all shipped controllers of the role.",
 )
 @click.option(
@@ -61,17 +68,15 @@ _COSTS_FILE = "costs.json"
     metavar="NAME=value",
     help="Set a parameter of the (only) controller.",
 )
-@click.option(
+@path_option(
     "--scenarios",
     multiple=True,
     metavar="DIR|SCENARIO",
-    type=PATH,
     shell_complete=complete_scenario,
     help="Scenarios to run; default: the folder scenarios/ here, else the shipped ones.",
 )
-@click.option(
+@path_option(
     "--output-dir",
-    type=PATH,
     default=Path("runs/bench"),
     show_default=True,
     help="Folder for the results.",
@@ -85,10 +90,10 @@ _COSTS_FILE = "costs.json"
     "cost (s per step) and cost_ratio"
 )
 def command(
-    controllers: tuple[str, ...],
+    controllers: Texts,
     role: str,
     with_shipped: bool,
-    settings: tuple[str, ...],
+    settings: Texts,
     scenarios: tuple[Path, ...],
     output_dir: Path,
     jobs: int | None,
@@ -179,7 +184,8 @@ class _Bench:
         for source in sources:
             progress.print_next(parse_source(source).name)
             everything.append(self._run_trials(source, {}))
-        progress.print_costs()
+        if not self.as_json:
+            click.echo("measuring the processor time per step")
         reference, costs = self._measure_costs(everything)
         benched = [
             replace(trials, cost=cost, cost_ratio=cost / costs[0])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ...core.errors import CheckError, InputError, Problem, nearest_file
-from ..options import PATH
+from ..options import Texts, flag_option, path_option
 from .new_vehicle import read_vehicle_file
 
 if TYPE_CHECKING:
@@ -18,12 +18,9 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("sources", nargs=-1)
-@click.option(
-    "--check", is_flag=True, help="Build nothing; check that the fmus/ of cosim are up to date."
-)
-@click.option(
+@flag_option("--check", help="Build nothing; check that the fmus/ of cosim are up to date.")
+@path_option(
     "--output",
-    type=PATH,
     help="Export a single source, in any folder, to this FMU.",
 )
 @click.option(
@@ -42,9 +39,8 @@ if TYPE_CHECKING:
         "class finds it below `self.resources` or beside its own file."
     ),
 )
-@click.option(
+@path_option(
     "--library",
-    type=PATH,
     multiple=True,
     metavar="DIR",
     help=(
@@ -63,13 +59,13 @@ if TYPE_CHECKING:
     ),
 )
 def command(
-    sources: tuple[str, ...],
+    sources: Texts,
     check: bool,
     output: Path | None,
     fmi_version: str,
     include: tuple[Path, ...],
     library: tuple[Path, ...],
-    values: tuple[str, ...],
+    values: Texts,
 ) -> int:
     """Export controllers and plants to fmus/.
 
@@ -115,24 +111,15 @@ def command(
     if output is not None:
         _build_one(named, output, int(fmi_version), include, library, values)
     else:
-        _refuse_options_of_one_source(fmi_version, include, values)
+        for option, is_given, reason in (
+            ("--fmi", fmi_version != "2", "fmus/ contains FMUs of both FMI versions"),
+            ("--set", values, "the FMUs in fmus/ have the values of their sources"),
+            ("--include", include, "the FMUs in fmus/ contain the files that their sources import"),
+        ):
+            if is_given:
+                raise InputError(f"{option} requires --output: {reason}")
         build(files or None, root, _print_built)
     return 0
-
-
-def _refuse_options_of_one_source(fmi: str, include: Sequence[Path], values: Sequence[str]) -> None:
-    """Raise InputError for an option that is valid with --output only."""
-    if fmi != "2":
-        raise InputError("--fmi requires --output: fmus/ contains FMUs of both FMI versions")
-    if values:
-        raise InputError(
-            "--set requires --output: the FMUs in fmus/ have the values of their sources"
-        )
-    if include:
-        raise InputError(
-            "--include requires --output: the FMUs in fmus/ contain the files that their sources "
-            "import"
-        )
 
 
 def _build_one(
@@ -141,7 +128,7 @@ def _build_one(
     fmi_version: int,
     include: tuple[Path, ...],
     library: tuple[Path, ...],
-    values: tuple[str, ...],
+    values: Texts,
 ) -> None:
     from ...export.build import build_to
     from ...scenario.settings import parse_settings
@@ -171,9 +158,6 @@ def _print_built(built: BuildResult) -> None:
     names = ", ".join(
         path.as_posix()[path.as_posix().rindex("fmus/") :] for path in built.fmus.values()
     )
-    click.echo(f"{_relative_to_cwd(built.source)} -> {names}")
-
-
-def _relative_to_cwd(source: Path) -> Path:
-    """Return a path relative to the working directory if it is inside it."""
-    return source.relative_to(Path.cwd()) if source.is_relative_to(Path.cwd()) else source
+    source, here = built.source, Path.cwd()
+    source = source.relative_to(here) if source.is_relative_to(here) else source
+    click.echo(f"{source} -> {names}")

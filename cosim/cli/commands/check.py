@@ -12,7 +12,7 @@ from ...core.system import Group, Stage
 from ...core.text import count_noun
 from .. import strict_sandbox, supervision
 from ..messages import collect_log, print_json
-from ..options import json_option, scenario_argument, settings_option
+from ..options import flag_option, json_option, scenario_argument, settings_option
 
 if TYPE_CHECKING:
     from ...core.component import Variable
@@ -23,9 +23,8 @@ if TYPE_CHECKING:
 @scenario_argument
 @settings_option
 @click.option("--connections/--no-connections", default=True, help="List every connection.")
-@click.option(
+@flag_option(
     "--expanded",
-    is_flag=True,
     help="Print the scenario as JSON instead, with what it extends and --set applied.",
 )
 @json_option(
@@ -55,6 +54,7 @@ def command(
     from ...scenario import load
     from ...scenario.nested_systems import load_scenario
     from ...scenario.settings import parse_settings
+    from ...scenario.stages import recommend
 
     fmu_isolation: Literal["fmu", "none"] = "fmu" if isolation == "fmu" else "none"
     logged = collect_log()
@@ -76,7 +76,9 @@ def command(
         if connections:
             _print_connections(prepared)
             _print_unconnected_inputs(prepared)
-        _print_recommendation(prepared)
+        click.echo("\nrecommendation for the order")
+        for line in recommend(prepared.system):
+            click.echo(f"  {line}")
         _print_verdict(prepared, _warnings(prepared, logged))
     finally:
         prepared.free()
@@ -91,16 +93,20 @@ def _warnings(prepared: PreparedRun, logged: Sequence[str]) -> list[Problem]:
 
 def _describe(prepared: PreparedRun, warnings: Sequence[Problem]) -> dict[str, Any]:
     """Return the expanded system as JSON."""
+    from ...scenario.plausibility import unconnected_inputs
     from ...scenario.stages import recommend
 
     times = prepared.settings
+    unconnected: dict[str, list[str]] = {}
+    for end in unconnected_inputs(prepared):
+        unconnected.setdefault(end.component, []).append(end.scalar)
     return {
         "name": prepared.spec.name,
         **{name: float(getattr(times, name)) for name in ("start_time", "stop_time", "step_size")},
         "steps": prepared.plan.grid.count,
         "signals": list(times.columns),
         **prepared.metadata["system"],
-        "unconnected_inputs": _unconnected_inputs(prepared),
+        "unconnected_inputs": unconnected,
         "recommendations": recommend(prepared.system),
         "warnings": list(map(str, warnings)),
     }
@@ -148,10 +154,8 @@ def _print_processes(prepared: PreparedRun, isolation: str, sandbox: str | None)
     shared = [name for name in components if name not in isolated]
     click.echo("\nprocesses" + (", all in bubblewrap" if sandbox == "strict" else ""))
     if shared:
-        click.echo(
-            f"  {'process of the command' if isolation == 'none' else 'supervised process'}: "
-            f"{', '.join(shared)}"
-        )
+        process = "process of the command" if isolation == "none" else "supervised process"
+        click.echo(f"  {process}: {', '.join(shared)}")
     for name, settings in isolated.items():
         click.echo(f"  {name}: its own process{', in a sandbox' if settings.sandbox else ''}")
 
@@ -176,14 +180,6 @@ def _print_nested_stages(stages: Sequence[Stage], indent: str) -> None:
                 _print_nested_stages(member.stages, indent + "   ")
 
 
-def _print_recommendation(prepared: PreparedRun) -> None:
-    from ...scenario.stages import recommend
-
-    click.echo("\nrecommendation for the order")
-    for line in recommend(prepared.system):
-        click.echo(f"  {line}")
-
-
 def _print_connections(prepared: PreparedRun) -> None:
     from ...scenario.overview import connection_notes
 
@@ -191,9 +187,8 @@ def _print_connections(prepared: PreparedRun) -> None:
     click.echo(f"\nconnections ({len(system.connections)})")
     for connection in system.connections:
         notes = connection_notes(system, connection)
-        click.echo(
-            f"  {connection.source} -> {connection.target}" + (f"  ({notes})" if notes else "")
-        )
+        note = f"  ({notes})" if notes else ""
+        click.echo(f"  {connection.source} -> {connection.target}{note}")
 
 
 def _print_unconnected_inputs(prepared: PreparedRun) -> None:
@@ -219,13 +214,3 @@ def _start_text(variable: Variable) -> str:
     if start is None:
         return "value of the component"
     return f"{start:g}" if isinstance(start, int | float) else str(start)
-
-
-def _unconnected_inputs(prepared: PreparedRun) -> dict[str, list[str]]:
-    """Return the unconnected inputs of each component that has some."""
-    from ...scenario.plausibility import unconnected_inputs
-
-    unconnected: dict[str, list[str]] = {}
-    for end in unconnected_inputs(prepared):
-        unconnected.setdefault(end.component, []).append(end.scalar)
-    return unconnected

@@ -50,18 +50,14 @@ def command(as_json: bool) -> int:
     if as_json:
         print_json([asdict(finding) for finding in findings])
     else:
-        _print_findings(findings)
+        section = ""
+        for finding in findings:
+            if finding.section != section:
+                click.echo(f"{section and chr(10)}{finding.section}")
+                section = finding.section
+            mark = "" if finding.state == "ok" else f"{finding.state.upper()}: "
+            click.echo(f"  {finding.name:20} {mark}{finding.found}")
     return 1 if any(finding.state == "broken" for finding in findings) else 0
-
-
-def _print_findings(findings: Iterable[Finding]) -> None:
-    section = ""
-    for finding in findings:
-        if finding.section != section:
-            click.echo(f"{section and chr(10)}{finding.section}")
-            section = finding.section
-        mark = "" if finding.state == "ok" else f"{finding.state.upper()}: "
-        click.echo(f"  {finding.name:20} {mark}{finding.found}")
 
 
 def _host_findings() -> Iterator[Finding]:
@@ -79,12 +75,7 @@ def _host_findings() -> Iterator[Finding]:
     cache = cache_directory()
     existing = next(path for path in (cache, *cache.parents) if path.exists())
     writable = os.access(existing, os.W_OK)
-    yield Finding(
-        "cosim",
-        "cache",
-        f"{cache}{'' if writable else ' cannot be written'}",
-        "ok" if writable else "missing",
-    )
+    yield _either("cosim", "cache", str(cache) if writable else "", f"{cache} cannot be written")
 
 
 def _executor_finding() -> Finding:

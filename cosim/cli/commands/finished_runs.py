@@ -8,16 +8,15 @@ from pathlib import Path
 import click
 
 from ..messages import print_log, progress_bar
-from ..options import PATH, complete_scenario, csv_option, page_option
+from ..options import PATH, complete_scenario, csv_option, flag_option, page_option, path_option
 
 FORMATS = ("png", "svg")
 
 
 @click.command()
 @click.argument("results", nargs=-1, required=True, metavar="RESULT...", type=PATH)
-@click.option(
+@path_option(
     "--output-dir",
-    type=PATH,
     help="Folder for the figures; default: that of the result.",
 )
 @click.option(
@@ -28,14 +27,11 @@ FORMATS = ("png", "svg")
     default=FORMATS,
     help="File format of the figures; default: both.",
 )
-@click.option(
+@flag_option(
     "--timings",
-    is_flag=True,
     help="Also draw a comparison of the real-time factors of all RESULTs.",
 )
-@click.option(
-    "--video", is_flag=True, help='Also render a video of each run, CAMERA.mp4 (extra "video").'
-)
+@flag_option("--video", help='Also render a video of each run, CAMERA.mp4 (extra "video").')
 @csv_option
 @click.option(
     "--camera",
@@ -87,14 +83,12 @@ def _print_paths(files: Iterable[Path]) -> None:
 
 @click.command()
 @click.argument("result", type=PATH)
-@click.option(
+@path_option(
     "--output-file",
-    type=PATH,
     help="File of the page; default: report.html in the folder of RESULT.",
 )
-@click.option(
+@path_option(
     "--reference",
-    type=PATH,
     shell_complete=complete_scenario,
     metavar="RESULT|SCENARIO",
     help=(
@@ -129,9 +123,8 @@ def report(result: Path, output_file: Path | None, reference: Path | None, open_
 @click.command()
 @click.argument("result", type=PATH)
 @click.argument("other", required=False, type=PATH)
-@click.option(
+@path_option(
     "--output-file",
-    type=PATH,
     help="File of the page; default: replay.html in the folder of RESULT.",
 )
 @page_option

@@ -16,7 +16,7 @@ from ...core.text import shorten
 from ...scenario.file_paths import SHIPPED
 from .. import current_command_line
 from ..messages import print_json, print_line
-from ..options import json_option
+from ..options import flag_option, json_option
 from ..shipped import shipped_fmus
 from .new_vehicle import read_vehicle_file
 
@@ -67,7 +67,7 @@ _USED_CAPABILITIES = {
 
 @click.command()
 @click.argument("fmu")
-@click.option("--locals", "with_locals", is_flag=True, help="Also list local variables.")
+@flag_option("--locals", "with_locals", help="Also list local variables.")
 @json_option(
     "an object with properties and variables, a list of name, type, causality, variability, unit, "
     "shape, start, minimum, "
@@ -227,11 +227,8 @@ def _variable_as_json(variable: Variable) -> dict[str, Any]:
         "description",
     )
     unit = variable.unit.name if variable.unit else None
-    return {
-        **{name: getattr(variable, name) for name in names},
-        "unit": unit,
-        "items": dict(variable.items),
-    }
+    values = {name: getattr(variable, name) for name in names}
+    return {**values, "unit": unit, "items": dict(variable.items)}
 
 
 def _print_variables(causality: str, variables: list[Variable]) -> None:

@@ -13,9 +13,9 @@ from typing import Any
 import click
 
 from ...core import __version__, resources
-from ...core.errors import InputError, Problem, abbreviate_names
+from ...core.errors import abbreviate_names
 from ...studies.regression import Regression
-from ..options import PATH
+from ..options import PATH, flag_option, refuse_existing
 
 _TEMPLATES = Path(__file__).parents[1] / "templates"
 #: template of each file of a new project
@@ -35,17 +35,13 @@ _PLANT = "fmus/strider.fmu"
 
 @click.command()
 @click.argument("directory", type=PATH)
-@click.option("--force", is_flag=True, help="Overwrite existing files.")
+@flag_option("--force", help="Overwrite existing files.")
 def command(directory: Path, force: bool) -> int:
     """Create a project in DIRECTORY with a controller, a scenario, its reference, tests and CI.
 
     Runs the scenario to write the reference. The new project passes its tests.
     """
-    present = [
-        directory / name for name in (*_PROJECT_FILES, _PLANT) if (directory / name).exists()
-    ]
-    if present and not force:
-        raise InputError([Problem("exists; --force overwrites it", str(path)) for path in present])
+    refuse_existing((directory / name for name in (*_PROJECT_FILES, _PLANT)), force)
     untouched = _other_entries(directory)
     _write_project(directory)
     if untouched:

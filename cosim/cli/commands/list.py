@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -12,7 +11,7 @@ import click
 from .. import current_command_line
 from ..messages import print_json
 from ..options import json_option
-from ..shipped import CATALOGUE, Entry, group_scenarios
+from ..shipped import CATALOGUE, group_scenarios
 
 
 @click.command()
@@ -37,18 +36,14 @@ def list_shipped(kinds: tuple[str, ...], as_json: bool) -> None:
         if len(entries) > 1:
             click.echo(f"{chr(10) if i else ''}{kind}")
         groups = group_scenarios(found) if kind == "scenarios" else {"": found}
-        _print_groups(groups, width=max(len(entry.name) for entry in found))
-
-
-def _print_groups(groups: Mapping[str, Sequence[Entry]], width: int) -> None:
-    """Print the entries of each group below its heading, with names in a column of `width`."""
-    for heading, entries in groups.items():
-        if heading:
-            click.echo(f"{heading}:")
-        for entry in entries:
-            click.echo(f"  {entry.name:{width}}  {entry.description}")
-            if entry.arguments and current_command_line().verbosity > 0:
-                click.echo(f"  {'':{width}}    arguments: {entry.arguments}")
+        width = max(len(entry.name) for entry in found)
+        for heading, group in groups.items():
+            if heading:
+                click.echo(f"{heading}:")
+            for entry in group:
+                click.echo(f"  {entry.name:{width}}  {entry.description}")
+                if entry.arguments and current_command_line().verbosity > 0:
+                    click.echo(f"  {'':{width}}    arguments: {entry.arguments}")
 
 
 @click.command()
@@ -69,11 +64,12 @@ def schema(kind: str | None) -> None:
 
 def _schema(kind: str | None) -> dict[str, Any]:
     if kind in ("sweep", "tune", "worst"):
-        from ...studies.schema import SweepSpec, TuneSpec, WorstCaseSpec, study_json_schema
+        from ...scenario.schema_types import schema_of
+        from ...studies.schema import StudySpec, SweepSpec, TuneSpec, WorstCaseSpec
 
-        if kind == "worst":
-            return study_json_schema(WorstCaseSpec)
-        return study_json_schema(SweepSpec if kind == "sweep" else TuneSpec)
+        kinds: dict[str, type[StudySpec]]
+        kinds = {"sweep": SweepSpec, "tune": TuneSpec, "worst": WorstCaseSpec}
+        return schema_of(kinds[kind])
     if kind == "vehicle":
         from ...export.plant import vehicle_file_schema
 

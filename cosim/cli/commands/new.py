@@ -15,7 +15,7 @@ import click
 
 from ...core import resources
 from ...core.errors import InputError, Problem, did_you_mean
-from ..options import new_file_options
+from ..options import flag_option, new_file_options, refuse_existing
 from .new_vehicle import vehicle
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
@@ -95,9 +95,8 @@ command.add_command(vehicle)
     show_default=True,
     help=f"Role, which determines the variables: {', '.join(ROLES)}.",
 )
-@click.option(
+@flag_option(
     "--library",
-    is_flag=True,
     help=(
         "With --language modelica: a speed controller of a vessel around the Standard Library's "
         "LimPID."
@@ -187,9 +186,7 @@ def _substitute(text: str, names: Mapping[str, str]) -> str:
 def _write_files(files: Mapping[Path, str], plants: Iterable[Path], force: bool) -> None:
     from ...results.files import write_file
 
-    present = [path for path in (*files, *plants) if path.exists()]
-    if present and not force:
-        raise InputError([Problem("exists; --force overwrites it", str(path)) for path in present])
+    refuse_existing((*files, *plants), force)
     for path, text in files.items():
         write_file(path, text)
         click.echo(path)
@@ -239,8 +236,7 @@ def scenario(name: str, base: str, directory: Path, force: bool) -> None:
             "spaces"
         )
     file, found = directory / f"{name}.json", find_scenario(base)
-    if file.exists() and not force:
-        raise InputError([Problem("exists; --force overwrites it", str(file))])
+    refuse_existing([file], force)
     if problems := load_scenario(found).problems:
         raise InputError(problems)
     content = extending_scenario(base, directory, name, f"{found.stem} with changes")

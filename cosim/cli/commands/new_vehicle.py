@@ -15,7 +15,7 @@ import click
 from ...core import resources
 from ...core.errors import InputError, Problem, did_you_mean
 from ...scenario.json_document import Document, read_document
-from ..options import PATH, new_file_options
+from ..options import new_file_options, path_option, refuse_existing
 
 _Result = TypeVar("_Result")
 
@@ -33,16 +33,14 @@ _SCENARIO_KEYS = frozenset({"components", "extends", "scenario"})
     help="Vehicle file, or name of a shipped vehicle.",
 )
 @new_file_options()
-@click.option(
+@path_option(
     "--urdf",
-    type=PATH,
     help=(
         "URDF file with the mass, inertia and collision shape, unless the file of --from has them."
     ),
 )
-@click.option(
+@path_option(
     "--mesh",
-    type=PATH,
     help=(
         "STL, OBJ or GLB file with the shape: inertia for an even density, convex collision "
         "pieces, appearance. Requires the extra mesh."
@@ -75,8 +73,7 @@ def vehicle(
     if not re.fullmatch(r"[A-Za-z_]\w*", name):
         raise InputError(f'"{name}" is not a name of a vehicle: expected letters, digits and "_"')
     file, source = directory / f"{name}.json", read_document(_find_vehicle(base))
-    if file.exists() and not force:
-        raise InputError([Problem("exists; --force overwrites it", str(file))])
+    refuse_existing([file], force)
     vehicle = _vehicle(source, name, urdf, mesh, mesh_scale)
     text = json.dumps(vehicle.data, indent=4) + "\n" if urdf or mesh else source.text
     write_file(file, text)
@@ -118,6 +115,12 @@ def _vehicle(
             or [Problem("expected a JSON object with the data of a vehicle", str(source.file))]
         )
     data, balance, warnings = source.value, "", list[str]()
+
+    def located(problem: Problem) -> Problem:
+        # keys that were imported are in the file from which they were imported
+        imported = dict.fromkeys(data.keys() - source.value.keys(), urdf or mesh)
+        return _located(problem, source, imported)
+
     try:
         for file in filter(None, (urdf, mesh)):
             read = (
@@ -130,25 +133,12 @@ def _vehicle(
             balance += f", centre of mass [{centre}] m in {file.name}"
         mass, inertia, parameters, found, performance = examine_vehicle(data, name)
     except InputError as error:
-        raise InputError(
-            [
-                _located(problem, source, _imported(data, source, urdf or mesh))
-                for problem in error.problems
-            ]
-        ) from None
-    located = (
-        _located(problem, source, _imported(data, source, urdf or mesh)) for problem in found
-    )
+        raise InputError(list(map(located, error.problems))) from None
     balance = f"mass {mass:.4g} kg, inertia {inertia} kg.m2{balance}"
     balance += "".join(f"\n  {key:<12} {text}" for key, text in performance.items())
-    return _Vehicle(data, balance, parameters, [*warnings, *map(str, located)])
-
-
-def _imported(
-    data: Mapping[str, Any], source: Document, file: Path | None
-) -> Mapping[str, Path | None]:
-    """Return the keys that were imported, each with the file from which it was imported."""
-    return dict.fromkeys(data.keys() - source.value.keys(), file)
+    return _Vehicle(
+        data, balance, parameters, [*warnings, *(str(located(problem)) for problem in found)]
+    )
 
 
 def _located(problem: Problem, source: Document, imported: Mapping[str, Path | None]) -> Problem:

@@ -13,7 +13,7 @@ import click
 from ...core.resources import available_processors
 from ...core.text import count_noun
 from ..messages import print_json, print_outcome
-from ..options import PATH, complete_scenario, jobs_option, json_option
+from ..options import PATH, complete_scenario, flag_option, jobs_option, json_option, path_option
 
 if TYPE_CHECKING:
     from ...studies.regression import RegressionOutcome
@@ -39,9 +39,8 @@ _INVALID_XML_CHARACTERS = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U0001000
     metavar="PATTERN",
     help='Compare only these signals of the reference; "*" matches any text.',
 )
-@click.option(
+@path_option(
     "--plot",
-    type=PATH,
     metavar="FILE",
     help="Draw the worst signals in their tubes (PNG or SVG).",
 )
@@ -100,16 +99,14 @@ def compare(
     type=PATH,
     shell_complete=complete_scenario,
 )
-@click.option("--update", is_flag=True, help="Write new references from these runs.")
-@click.option(
+@flag_option("--update", help="Write new references from these runs.")
+@path_option(
     "--junit",
-    type=PATH,
     metavar="FILE.xml",
     help="Also write the outcomes as JUnit XML.",
 )
-@click.option(
+@path_option(
     "--output-dir",
-    type=PATH,
     default=Path("runs"),
     show_default=True,
     help="Folder for the results.",

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -15,12 +12,7 @@ from ...core.errors import InputError, Problem
 from ...process.output_lock import LockKeeper
 from .. import live, strict_sandbox, supervision
 from ..messages import log_problems, print_log, progress_bar, warn_overwriting
-from ..options import (
-    csv_option,
-    json_option,
-    output_dir_option,
-    scenario_argument,
-)
+from ..options import csv_option, flag_option, json_option, output_dir_option, scenario_argument
 from ..run_outputs import RunOptions, RunOutcome, save_after_crash, write_outputs
 from ..unfinished_runs import OutputFiles
 
@@ -28,7 +20,6 @@ if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
     from ...api import Simulation
-    from ...engine.plan_run import Observer
     from ...scenario import PreparedRun
 
 RESULT_FILES = (
@@ -70,11 +61,9 @@ RESULT_FILES = (
     show_default=True,
     help="Reaction to a real-time run that is more than one step late.",
 )
-@click.option("--parquet", is_flag=True, help="Also write result.parquet (extra `parquet`).")
-@click.option(
-    "--mcap", is_flag=True, help="Also write result.mcap, for Foxglove and ROS 2 (extra `mcap`)."
-)
-@click.option("--no-report", is_flag=True, help="Write neither figures nor report.html.")
+@flag_option("--parquet", help="Also write result.parquet (extra `parquet`).")
+@flag_option("--mcap", help="Also write result.mcap, for Foxglove and ROS 2 (extra `mcap`).")
+@flag_option("--no-report", help="Write neither figures nor report.html.")
 @json_option(
     "an object with name, exit_code, failure, termination, start_time and end_time (s), "
     "loop_seconds, kpis, checks, warnings, "
@@ -101,7 +90,14 @@ def command(
     if view:
         live.check_view_options(isolation, sandbox, run_options.late)
     if strict_sandbox.must_rerun(sandbox):
-        return strict_sandbox.rerun_in_bubblewrap(*_sandbox_paths(run_options))
+        from ...scenario import load_scenario
+        from ...scenario.settings import parse_settings
+
+        loaded = load_scenario(run_options.scenario, parse_settings(run_options.settings))
+        output = None
+        if not loaded.problems:
+            output = run_options.output_folder(loaded.spec.name).absolute()
+        return strict_sandbox.rerun_in_bubblewrap(loaded.files(), output)
     save = partial(save_after_crash, options=run_options)
     with LockKeeper() as locks:
         if view:
@@ -117,20 +113,6 @@ def command(
         )
 
 
-def _sandbox_paths(options: RunOptions) -> tuple[list[Path], Path | None]:
-    """Return the files that the command reads, and its output directory.
-
-    The directory is None if the scenario is invalid.
-    """
-    from ...scenario import load_scenario
-    from ...scenario.settings import parse_settings
-
-    loaded = load_scenario(options.scenario, parse_settings(options.settings))
-    return loaded.files(), None if loaded.problems else options.output_folder(
-        loaded.spec.name
-    ).absolute()
-
-
 def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | None = None) -> int:
     """Run the scenario in this process, write its outputs and return the exit code.
 
@@ -143,7 +125,14 @@ def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | Non
     from ...process.run_files import keeping_run_files
 
     warnings = print_log()
-    _require_packages(options)
+    if options.parquet:
+        from ...results.parquet_files import require_parquet
+
+        require_parquet()
+    if options.mcap:
+        from ...results.mcap_files import require_mcap
+
+        require_mcap()
     began = time.perf_counter()
     with _load(options, None if link else options.real_time) as simulation:
         prepared = simulation.prepared
@@ -154,29 +143,17 @@ def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | Non
             keeping_run_files(
                 OutputFiles.of_folder(folder).unfinished, prepared.metadata, writes_csv=True
             ),
-            _progress_observers(prepared) as observers,
+            progress_bar(prepared.spec.name) as progress,
             default_float_mode(),
             simulation,
         ):
-            result = simulation.execute(observers, control)
+            result = simulation.execute([progress] if progress else [], control)
             result.metadata["warnings"] = warnings
             if control:
                 result.metadata["live_events"] = control.finish()
             return supervision.results_written(
                 write_outputs(RunOutcome(options, prepared, result, began))
             )
-
-
-def _require_packages(options: RunOptions) -> None:
-    """Raise InputError if an optional package for one of the output files is not installed."""
-    if options.parquet:
-        from ...results.parquet_files import require_parquet
-
-        require_parquet()
-    if options.mcap:
-        from ...results.mcap_files import require_mcap
-
-        require_mcap()
 
 
 def _load(options: RunOptions, real_time: float | None) -> Simulation:
@@ -222,9 +199,3 @@ def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeepe
     remove_files(folder, *RESULT_FILES)
     for figure in prepared.spec.figures:
         remove_files(folder, *(f"{figure.name}{suffix}" for suffix in (".png", ".svg", ".csv")))
-
-
-@contextmanager
-def _progress_observers(prepared: PreparedRun) -> Iterator[list[Observer]]:
-    with progress_bar(prepared.spec.name) as observer:
-        yield [observer] if observer else []

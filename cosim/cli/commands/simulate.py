@@ -12,21 +12,20 @@ from ...core.text import count_noun
 from ...process.output_lock import LOCK_FILE, LockKeeper, acquire_lock
 from ...process.temporary_folders import temporary_run_folder
 from .. import current_command_line, report_error, strict_sandbox, supervision
-from ..messages import print_json, print_line
-from ..options import PATH, csv_option, json_option
+from ..messages import log_problems, print_json, print_line, print_log
+from ..options import PATH, csv_option, json_option, path_option
 from ..unfinished_runs import OutputFiles, writing_results
 
 if TYPE_CHECKING:
-    from ...components.fmi import Isolation, Method
+    from ...components.fmi import Method
     from ...core.recording import Recording
     from ...process.supervisor import SupervisedOutcome
 
 
 @click.command(cls=strict_sandbox.SandboxCommand)
 @click.argument("fmu", type=PATH)
-@click.option(
+@path_option(
     "--output-file",
-    type=PATH,
     help="CSV file for the outputs; default: print their final values.",
 )
 @click.option("--stop-time", help="Stop time (s); default: the FMU's, else 1 s after the start.")
@@ -41,9 +40,8 @@ if TYPE_CHECKING:
     metavar="name=value",
     help="Set a parameter or the start value of a variable.",
 )
-@click.option(
+@path_option(
     "--input-file",
-    type=PATH,
     help='CSV file with the column "time" and columns named like inputs.',
 )
 @click.option(
@@ -85,9 +83,7 @@ def command(isolation: str, sandbox: str | None, output_file: Path | None, **opt
         if output and output.replaced:
             unfinished = OutputFiles.of_file(output.replaced).unfinished
         return supervision.run_supervised_command(
-            lambda: _simulate(
-                locks, unfinished, output, _isolation(isolation, bool(sandbox)), **options
-            ),
+            lambda: _simulate(locks, unfinished, output, isolation, bool(sandbox), **options),
             isolation,
             lambda outcome: _save_after_crash(outcome, output),
         )
@@ -129,7 +125,8 @@ def _simulate(
     locks: LockKeeper,
     folder: Path,
     output: _Output | None,
-    fmu_isolation: Isolation | None,
+    isolation: str,
+    sandbox: bool,
     fmu: Path,
     stop_time: str | None,
     step_size: str | None,
@@ -141,7 +138,7 @@ def _simulate(
     as_json: bool,
 ) -> int:
     from ...api.single_fmu import compile_fmu, parse_solver
-    from ...components.fmi import InstanceSettings
+    from ...components.fmi import InstanceSettings, Isolation
     from ...core.errors import InputError, Problem
     from ...engine.plan_run import simulating
     from ...engine.recorder import find_space_problems
@@ -150,14 +147,14 @@ def _simulate(
     from ...results.files import remove_files
     from ...results.result import describe_termination
     from ...scenario.settings import parse_settings
-    from .. import messages
 
-    messages.print_log()
+    print_log()
     values = parse_settings(start_values)
     settings = InstanceSettings(tolerance, parse_solver(solver, solver_step_size or None))
+    fmu_isolation = Isolation(sandbox=sandbox) if sandbox or isolation == "fmu" else None
     times = stop_time or None, step_size or None
     plan, warnings = compile_fmu(fmu, *times, input_file, values, None, fmu_isolation, settings)
-    messages.log_problems(map(Problem, warnings))
+    log_problems(map(Problem, warnings))
     target = output.replaced if output else None
     if output and target:
         run_lock = target.parent / LOCK_FILE
@@ -185,9 +182,8 @@ def _simulate(
 def _save_after_crash(outcome: SupervisedOutcome, output: _Output | None) -> None:
     """Write the rows of a child process that crashed, was killed or was interrupted."""
     from ...results.checks import warn_non_finite
-    from .. import messages
 
-    messages.print_log()
+    print_log()
     recording = supervision.recover_outcome_recording(outcome)
     warn_non_finite(recording)
     _write_recording(recording, output, outcome.journal.folder)
@@ -218,9 +214,3 @@ def _print_final_values(recording: Recording, as_json: bool) -> None:
             text = f"{value:.6g}"
         unit = "" if recording.units[name] == "1" else recording.units[name]
         print_line(f"{name} = {text} {unit}".rstrip())
-
-
-def _isolation(isolation: str, sandbox: bool) -> Isolation | None:
-    from ...components.fmi import Isolation
-
-    return Isolation(sandbox=sandbox) if sandbox or isolation == "fmu" else None

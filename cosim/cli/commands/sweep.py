@@ -16,11 +16,10 @@ from ...core.text import count_noun
 from ...report.tables import print_table
 from .. import current_command_line, study_options
 from ..messages import print_json, warn_overwriting
-from ..options import complete_study, json_option, output_dir_option
+from ..options import complete_study, flag_option, json_option, output_dir_option
 
 if TYPE_CHECKING:
     from ...studies.execution.run_store import RunStore
-    from ...studies.summary.statistics import RunGroup
     from ...studies.summary.sweep_files import SweepSummary
     from ...studies.sweep import Sweep
 
@@ -33,10 +32,8 @@ _MAX_PRINTED = 20
 @click.command()
 @click.argument("sweep", shell_complete=complete_study)
 @output_dir_option
-@click.option("--parquet", is_flag=True, help="Also write table.parquet (extra `parquet`).")
-@click.option(
-    "--replays", is_flag=True, help="Also write the 3-D replay of one run of each cell of the maps."
-)
+@flag_option("--parquet", help="Also write table.parquet (extra `parquet`).")
+@flag_option("--replays", help="Also write the 3-D replay of one run of each cell of the maps.")
 @json_option(
     "an object with name, folder, runs, finished, failed, units (by KPI), failure_causes (cause, "
     "runs, first_run), "
@@ -79,19 +76,16 @@ def _run_sweep(
     workers: int | None,
     scheduler: str | None,
 ) -> int:
-    from ...process.supervisor import interrupt_on_termination
     from ...studies.summary.sweep_files import write_sweep_files
 
     began, interrupted = time.monotonic(), False
     done = sum(key in run_store for key in sweep.keys)
     if done < len(sweep):
         try:
-            with (
-                interrupt_on_termination(),
-                study_options.show_progress(len(sweep)) as progress,
-                study_options.create_runner(sweep.study, workers, scheduler) as runner,
+            with study_options.running_study(sweep.study, len(sweep), workers, scheduler, done) as (
+                runner,
+                progress,
             ):
-                progress.start(done)
                 sweep.run(run_store, runner, progress)
         except KeyboardInterrupt:
             interrupted = True
@@ -156,10 +150,13 @@ def _print_summary(sweep: Sweep, summary: SweepSummary) -> None:
         rows = [[name, summary.units.get(name, ""), *select(found)] for name, found in numbers]
         print_table(["KPI", "unit", *columns], rows)
     if sweep.criteria or summary.failed:
-        print_table(
-            ["runs", "n", "success", "95 % interval"],
-            [_success_row(group) for group in _first(summary.groups, "success.csv")],
-        )
+        rows = []
+        for group in _first(summary.groups, "success.csv"):
+            label = ", ".join(f"{name} = {value}" for name, value in group.labels.items())
+            rate, low, high = (100 * share for share in (group.success_rate, *group.interval))
+            interval = f"{low:.1f} ... {high:.1f} %"
+            rows.append([label or "all", str(group.runs), f"{rate:.1f} %", interval])
+        print_table(["runs", "n", "success", "95 % interval"], rows)
         if summary.groups[0].distinct < summary.groups[0].runs:
             runs = count_noun(summary.groups[0].runs, "run")
             click.echo(
@@ -185,18 +182,11 @@ def _first(entries: Sequence[T], file: str) -> Iterator[T]:
 
 
 def _summary_as_json(sweep: Sweep, summary: SweepSummary, folder: Path) -> dict[str, Any]:
-    groups = [
-        {
-            "labels": group.labels,
-            "runs": group.runs,
-            "distinct": group.distinct,
-            "passed": group.passed,
-            "success_rate": group.success_rate,
-            "interval": group.interval,
-            "kpis": dict(group.statistics()),
-        }
-        for group in summary.groups
-    ]
+    keys = ("labels", "runs", "distinct", "passed", "success_rate", "interval")
+    groups = []
+    for group in summary.groups:
+        values = {key: getattr(group, key) for key in keys}
+        groups.append({**values, "kpis": dict(group.statistics())})
     return {
         "name": sweep.study_file.spec.name,
         "folder": folder,
@@ -211,14 +201,3 @@ def _summary_as_json(sweep: Sweep, summary: SweepSummary, folder: Path) -> dict[
         "missed_criteria": [each._asdict() for each in summary.missed_criteria],
         "groups": groups,
     }
-
-
-def _success_row(group: RunGroup) -> list[str]:
-    label = ", ".join(f"{name} = {value}" for name, value in group.labels.items()) or "all"
-    low, high = group.interval
-    return [
-        label,
-        str(group.runs),
-        f"{100 * group.success_rate:.1f} %",
-        f"{100 * low:.1f} ... {100 * high:.1f} %",
-    ]

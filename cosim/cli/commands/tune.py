@@ -13,7 +13,7 @@ from ...core.text import count_noun
 from ...report.tables import print_table
 from .. import study_options
 from ..messages import print_json
-from ..options import complete_study, json_option, output_dir_option
+from ..options import complete_study, flag_option, json_option, output_dir_option
 
 if TYPE_CHECKING:
     from ...studies.execution.run_store import RunStore
@@ -28,9 +28,8 @@ if TYPE_CHECKING:
     "the object of best.json, with failure, the reason why no point is feasible, or null; with "
     "--worst that of worst.json"
 )
-@click.option(
+@flag_option(
     "--worst",
-    is_flag=True,
     help="Search for the run that breaks a controller; TUNE is then a file of such a search.",
 )
 @study_options.study_options
@@ -64,15 +63,12 @@ def _run_tuning(
     workers: int | None,
     scheduler: str | None,
 ) -> int:
-    from ...process.supervisor import interrupt_on_termination
     from ...studies.tune import describe_best, write_tuning_files
 
     try:
-        with (
-            interrupt_on_termination(),
-            study_options.show_progress(tuning.spec.max_runs) as progress,
-            study_options.create_runner(tuning.study, workers, scheduler) as runner,
-        ):
+        with study_options.running_study(
+            tuning.study, tuning.spec.max_runs, workers, scheduler
+        ) as (runner, progress):
             tuning.run(run_store, runner, progress)
     except (CosimError, KeyboardInterrupt) as error:
         if tuning.trials and not isinstance(error, InputError):
@@ -99,16 +95,16 @@ def _find_worst(
     retry_failed: bool,
 ) -> int:
     """Search for the run that breaks a controller."""
-    from ...process.supervisor import interrupt_on_termination
     from ...studies.worst_case import WorstCase, describe_worst_case, write_worst_case_files
 
     search = WorstCase.from_file(file, max_runs)
     folder = output_dir or Path("runs") / search.spec.name
     with (
         study_options.open_run_store(folder, retry_failed) as run_store,
-        interrupt_on_termination(),
-        study_options.show_progress(search.spec.max_runs) as progress,
-        study_options.create_runner(search.study, workers, scheduler) as runner,
+        study_options.running_study(search.study, search.spec.max_runs, workers, scheduler) as (
+            runner,
+            progress,
+        ),
     ):
         search.run(run_store, runner, progress)
     files = write_worst_case_files(search, folder)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -12,7 +12,7 @@ from ..messages import print_json
 from ..options import PATH, json_option
 
 if TYPE_CHECKING:
-    from ...components.fmi.preflight import Finding
+    from ...components.fmi.preflight.findings import Finding
 
 
 @click.command()
@@ -29,39 +29,34 @@ def command(fmus: tuple[Path, ...], as_json: bool) -> int:
     if as_json:
         listed = []
         for path, found in findings.items():
-            listed += [_finding_as_json(path, finding) for finding in found]
+            for finding in found:
+                listed.append(
+                    {
+                        "file": str(path),
+                        "severity": finding.severity,
+                        "rule": finding.rule,
+                        "source": finding.source,
+                        "member": finding.member,
+                        "line": finding.line or None,
+                        "message": finding.message,
+                    }
+                )
         print_json(listed)
     else:
-        _print_findings(findings)
+        for path, found in findings.items():
+            if not found:
+                click.echo(f"{path}: no findings")
+            for finding in found:
+                click.echo(f"{path}: {finding.severity}: {finding}")
     return 2 if any(findings.values()) else 0
 
 
 def _validate_fmu(path: Path) -> Sequence[Finding]:
-    from ...components.fmi.preflight.archive import FILE
+    from ...components.fmi.preflight.findings import Finding
     from ...components.fmi.preflight.validation import validate_fmu
     from ...core.errors import InputError
 
     try:
         return validate_fmu(path)
     except InputError as error:
-        return [FILE(problem.message) for problem in error.problems]
-
-
-def _print_findings(findings: Mapping[Path, Sequence[Finding]]) -> None:
-    for path, found in findings.items():
-        if not found:
-            click.echo(f"{path}: no findings")
-        for finding in found:
-            click.echo(f"{path}: {finding.rule.severity}: {finding}")
-
-
-def _finding_as_json(path: Path, finding: Finding) -> dict[str, Any]:
-    return {
-        "file": str(path),
-        "severity": finding.rule.severity,
-        "rule": finding.rule.name,
-        "source": finding.rule.source,
-        "member": finding.member,
-        "line": finding.line or None,
-        "message": finding.message,
-    }
+        return [Finding("archive.file", problem.message) for problem in error.problems]

@@ -29,6 +29,7 @@ from __future__ import annotations
 import os
 import resource
 import socket
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -47,7 +48,6 @@ __all__ = [
     "clear_environment",
     "enter_sandbox",
     "find_available_sandboxes",
-    "find_bubblewrap",
     "interpreter_folders",
     "probe_restrictions",
 ]
@@ -94,9 +94,11 @@ def enter_sandbox(settings: SandboxSettings) -> None:
     if settings.confine and (reason := _unmet_requirement(settings)):
         raise InputError(f"the sandbox cannot be entered: {reason}")
     limits.detach(settings.parent)
-    limits.set_limits(
-        settings.memory, settings.open_files, settings.file_size, settings.cpu_seconds
-    )
+    limits.lower_limit(resource.RLIMIT_AS, limits.mapped_size() + settings.memory)
+    limits.lower_limit(resource.RLIMIT_NOFILE, settings.open_files)
+    limits.lower_limit(resource.RLIMIT_FSIZE, settings.file_size)
+    limits.lower_limit(resource.RLIMIT_CORE, 0)
+    limits.lower_limit(resource.RLIMIT_CPU, settings.cpu_seconds)
     # The order matters. The kernel demands that a process that confines itself gives up privileges
     # first. The environment is cleared before Landlock hides /proc, and the system call filter is
     # last, because it denies the calls by which session and limits are set.
@@ -179,8 +181,9 @@ def find_available_sandboxes() -> AvailableSandboxes:
 def probe_restrictions() -> ActiveRestrictions:
     """Determine the restrictions in force by trying to open the root folder and a socket."""
     return ActiveRestrictions(
-        files_confined=_is_root_unreadable(),
-        network_closed=_is_socket_denied(),
+        # Landlock forbids to open the root folder, which everyone else may read
+        files_confined=_is_denied(lambda: os.close(os.open("/", os.O_RDONLY | os.O_DIRECTORY))),
+        network_closed=_is_denied(lambda: socket.socket().close()),
         own_session=os.getsid(0) == os.getpid(),
         no_new_privileges=limits.no_new_privileges(),
         memory=_soft_limit(resource.RLIMIT_AS),
@@ -190,18 +193,9 @@ def probe_restrictions() -> ActiveRestrictions:
     )
 
 
-def _is_root_unreadable() -> bool:
-    """Return whether Landlock forbids to open the root folder, which everyone else may read."""
+def _is_denied(attempt: Callable[[], object]) -> bool:
     try:
-        os.close(os.open("/", os.O_RDONLY | os.O_DIRECTORY))
-    except PermissionError:
-        return True
-    return False
-
-
-def _is_socket_denied() -> bool:
-    try:
-        socket.socket().close()
+        attempt()
     except PermissionError:
         return True
     return False

@@ -17,7 +17,6 @@ from fractions import Fraction
 from multiprocessing.connection import Connection
 from typing import Any
 
-from ...core.component import Variable
 from ...core.errors import ComponentError, InputError, did_you_mean
 from ...core.system import System
 from ...core.time_grid import TimeGrid
@@ -100,25 +99,20 @@ class LiveControl:
 
         A short run soon removes them.
         """
-        adjustable = [
-            self._describe_variable(full_name, *owner)
-            for full_name, owner in self._adjustable.items()
-        ]
+        adjustable = []
+        for full_name, (component, variable) in self._adjustable.items():
+            described = {
+                "name": full_name,
+                "value": self._components[component].get(variable.name),
+                "unit": variable.unit.name if variable.unit else "",
+            }
+            for key in ("type", "minimum", "maximum", "description"):
+                described[key] = getattr(variable, key)
+            adjustable.append(described)
         with suspending_deadline():
             self._send({"about": {**self._run_info, "adjustable": adjustable}, **self._state(0)})
             self._connection.recv_bytes()
         self._restart_pacer(0)
-
-    def _describe_variable(self, full_name: str, name: str, variable: Variable) -> dict[str, Any]:
-        return {
-            "name": full_name,
-            "type": variable.type,
-            "value": self._components[name].get(variable.name),
-            "unit": variable.unit.name if variable.unit else "",
-            "minimum": variable.minimum,
-            "maximum": variable.maximum,
-            "description": variable.description,
-        }
 
     def _send(self, message: Mapping[str, Any]) -> None:
         self._connection.send_bytes(json.dumps(message, default=str).encode())
@@ -130,19 +124,16 @@ class LiveControl:
         message = json.loads(self._connection.recv_bytes())
         reply: dict[str, Any] = {"id": message.get("id")}
         try:
-            self._find_command(message)(n, message)
+            name = str(message.get("command"))
+            if name not in self._commands:
+                raise InputError(f'unknown command "{name}"{did_you_mean(name, self._commands)}')
+            self._commands[name](n, message)
         except InputError as error:
             reply["error"] = str(error)
         except ComponentError as error:
             self._send({**reply, "error": str(error), **self._state(n)})
             raise
         self._send({**reply, **self._state(n)})
-
-    def _find_command(self, message: Mapping[str, Any]) -> _Command:
-        name = str(message.get("command"))
-        if name not in self._commands:
-            raise InputError(f'unknown command "{name}"{did_you_mean(name, self._commands)}')
-        return self._commands[name]
 
     def _pause(self, _n: int, _message: Mapping[str, Any]) -> None:
         self._paused, self._steps = True, 0
@@ -190,11 +181,8 @@ class LiveControl:
                     self._components[name].set(variable_name, checked)
         except (ValueError, TypeError, OverflowError) as error:
             raise InputError(str(error)) from error
-        self._record_event(n, full_name, value)
-
-    def _record_event(self, n: int, name: str, value: Any) -> None:
-        """Store the event and write it to the files of the run, so that it survives a crash."""
-        self._events.append({"time": self._event_time(n), "set": {name: value}})
+        # the event is also written to the files of the run, so that it survives a crash
+        self._events.append({"time": self._event_time(n), "set": {full_name: value}})
         journal = current_journal()
         if journal and journal.folder:
             write_metadata(

@@ -73,26 +73,21 @@ class LiveView:
         """
         self._child_end.close()
         session = self._server.session = LiveSession(self._parent_end, journal, self._wait)
-        session.start()
         thread = Thread(target=self._server.serve_forever, args=(0.05,), daemon=True)
         thread.start()
         try:
             yield
         finally:
             session.mark_ended()
-            _wait_for_final_fetch(session)
+            until = time.monotonic() + FINAL_FETCH_TIMEOUT
+            while (
+                time.monotonic() - session.last_viewed < FINAL_FETCH_TIMEOUT
+                and not session.fully_viewed
+                and time.monotonic() < until
+            ):
+                time.sleep(0.02)
             self._server.shutdown()
             self._server.server_close()
-
-
-def _wait_for_final_fetch(session: LiveSession) -> None:
-    until = time.monotonic() + FINAL_FETCH_TIMEOUT
-    while (
-        time.monotonic() - session.last_viewed < FINAL_FETCH_TIMEOUT
-        and not session.fully_viewed
-        and time.monotonic() < until
-    ):
-        time.sleep(0.02)
 
 
 def has_display() -> bool:

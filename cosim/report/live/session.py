@@ -9,7 +9,6 @@ import json
 import time
 from collections.abc import Mapping
 from contextlib import suppress
-from functools import cached_property
 from multiprocessing.connection import Connection
 from queue import Empty, Queue
 from threading import Condition, Lock, Thread
@@ -46,17 +45,14 @@ class RowFeed:
     """
 
     def __init__(self, rows_file: RowsFile, expected_rows: int):
-        self._layout, self._dtype = rows_file.layout, rows_file.layout.dtype
+        self._dtype = rows_file.layout.dtype
         self._file = rows_file.path.open("rb")  # stays readable after the run has removed the file
-        self.columns = ["time", *(column.name for column in self._layout.columns)]
+        self.columns = ["time", *(column.name for column in rows_file.layout.columns)]
         self.stride = max(1, -(-expected_rows * len(self.columns) // MAX_VALUES))
         #: number of rows of the complete run after downsampling
         self.capacity = (expected_rows - 1) // self.stride + 1
-
-    @cached_property
-    def units(self) -> Mapping[str, str]:
-        """Unit of each signal, "" if unknown."""
-        return {column.name: column.unit for column in self._layout.columns}
+        #: unit of each signal, "" if unknown
+        self.units = {column.name: column.unit for column in rows_file.layout.columns}
 
     def available(self, recorded: int) -> int:
         """Return the number of rows after downsampling when `recorded` rows have been recorded.
@@ -119,11 +115,7 @@ class LiveSession:
         #: time until which a page is considered open (s, monotonic), and whether it has fetched all
         #: rows
         self.last_viewed, self.fully_viewed = 0.0, False
-        self._listener = Thread(target=self._listen, daemon=True)
-
-    def start(self) -> None:
-        """Start the thread that receives messages."""
-        self._listener.start()
+        Thread(target=self._listen, daemon=True).start()
 
     def _listen(self) -> None:
         """Receive messages until the simulation process closes the pipe.
@@ -200,19 +192,17 @@ class LiveSession:
         self._begin()
         self.last_viewed = until = time.monotonic() + LONG_POLL_TIMEOUT
         while True:
-            state, available = self._state, self._available()
+            state, feed = self._state, self.feed
+            available = feed.available(self._journal[ROW_COUNT]) if feed else 0
             if available > first or state["version"] != version or time.monotonic() > until:
                 break
             with self._changed:
                 self._changed.wait(POLL_INTERVAL)
         count = max(0, min(available - first, MAX_ROWS))
-        rows = self.feed.read(first, count) if self.feed else b""
+        rows = feed.read(first, count) if feed else b""
         self.last_viewed = time.monotonic()
         self.fully_viewed = state["ended"] and first + count >= available
         return {**state, "first": first, "count": count, "complete": self.fully_viewed}, rows
-
-    def _available(self) -> int:
-        return self.feed.available(self._journal[ROW_COUNT]) if self.feed else 0
 
     def send_command(self, message: Mapping[str, Any]) -> dict[str, Any]:
         """Send a command to the simulation process and return its reply (see `control`)."""

@@ -86,17 +86,26 @@ def parameter(
     )
 
 
-def vector_parameters(
-    name: str,
-    unit: str,
-    values: Sequence[float],
-    description: str,
-    minimum: float | None = None,
+def attribute_parameters(
+    data: object, rows: Iterable[tuple[str, str, str, float | None, str]]
 ) -> Iterator[Variable]:
-    """Yield a parameter for each component of a vector along x, y and z of the body."""
-    for axis, value in zip("xyz", values, strict=False):
-        text = f"{description}: {axis}, body frame"
-        yield parameter(f"{name}.{axis}", unit, float(value), text, minimum)
+    """Yield a parameter for each of some attributes of vehicle data.
+
+    An attribute is a number, or a vector along x, y and z of the body with a parameter for each
+    component.
+
+    Args:
+        data: Vehicle data.
+        rows: Attribute, and name, unit, smallest value and description of its parameter.
+    """
+    for attribute, name, unit, minimum, text in rows:
+        value = getattr(data, attribute)
+        if np.ndim(value):
+            for axis, component in zip("xyz", value, strict=False):
+                description = f"{text}: {axis}, body frame"
+                yield parameter(f"{name}.{axis}", unit, float(component), description, minimum)
+        else:
+            yield parameter(name, unit, value, text, minimum)
 
 
 def matrix_parameter(name: str, description: str, matrix: np.ndarray) -> Variable:
@@ -190,6 +199,9 @@ WORLD_OUTPUTS = (
     _flag("ditched", "centre of mass below the water; stays true"),
 )
 
+#: all outputs of a vessel
+VESSEL_OUTPUTS = (*MOTION_OUTPUTS, *DECK_OUTPUTS, *WORLD_OUTPUTS)
+
 
 def inertia_variables(mass: float, inertia: np.ndarray, mass_text: str) -> tuple[Variable, ...]:
     """Return the parameters `mass` (kg) and `inertia.*` (kg m2, centre of mass, body frame)."""
@@ -219,12 +231,12 @@ CURRENT_INPUTS = vector_variables(
 WAVE_GAIN_INPUT = (
     scalar_variable("wave_gain", "1", "factor on the amplitudes of all waves", start=1.0),
 )
-GROUND_DISTANCE_INPUT = (
+#: the same of vessels in waves
+FLOATING_INPUTS = (*WIND_INPUTS, *CURRENT_INPUTS, *WAVE_GAIN_INPUT)
+GROUND_INPUTS = (
     scalar_variable(
         "ground_distance", "m", "height of the rotor centre above the surface below", start=1e3
     ),
-)
-GROUND_SHARE_INPUT = (
     scalar_variable("ground_share", "1", "share of the rotors' area above this surface", start=1.0),
 )
 WATER_LEVEL_INPUT = (
@@ -237,8 +249,7 @@ ENVIRONMENT_INPUTS = frozenset(
         *WIND_INPUTS,
         *CURRENT_INPUTS,
         *WAVE_GAIN_INPUT,
-        *GROUND_DISTANCE_INPUT,
-        *GROUND_SHARE_INPUT,
+        *GROUND_INPUTS,
         *WATER_LEVEL_INPUT,
     )
 )

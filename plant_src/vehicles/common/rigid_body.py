@@ -7,12 +7,16 @@ unit quaternion (body to world) and the angular velocity (rad/s, body frame), in
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import casadi as ca
 
+from cosim.export.equations.model import ContinuousModel
+
 from . import kinematics
-from .interface import FREE_STATES
+from .interface import FREE_STATES, WORLD_OUTPUTS
 from .named_values import NamedValues
 
 #: number of rigid-body states; those of the actuators follow them in the state vector
@@ -112,3 +116,27 @@ def motion_of_state(state: ca.SX) -> ca.SX:
     return kinematics.motion_outputs(
         state[0:3], state[3:7], state[7:10], state[10:RIGID_BODY_STATE_COUNT]
     )
+
+
+def with_world_outputs(motion: ca.SX) -> ca.SX:
+    """Return all outputs of a plant FMU: its motion, and 0 for what only a world computes."""
+    return ca.vertcat(motion, ca.SX.zeros(len(WORLD_OUTPUTS)))
+
+
+@dataclass(frozen=True)
+class SteppedModel(ContinuousModel):
+    """A vehicle that is integrated by a compiled function.
+
+    Attributes:
+        step: Function of state, inputs, constants and length of a step (s) to the next state.
+    """
+
+    step: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX] = field(kw_only=True)
+
+    def integrate(
+        self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1
+    ) -> ca.SX:
+        """Return the state after `step` (s) with held inputs, in equal sub-steps."""
+        for _ in range(sub_steps):
+            state = self.step(state, inputs, parameters, step / sub_steps)
+        return state

@@ -35,10 +35,8 @@ a rotor have the coefficients 0.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from functools import cached_property
-from itertools import chain
 from typing import NamedTuple
 
 import casadi as ca
@@ -47,14 +45,14 @@ import numpy as np
 from cosim.core.component import Variable
 from cosim.export.equations.c_code import Callee
 from cosim.export.equations.fmu_code import as_block
-from cosim.export.equations.model import ContinuousModel, runge_kutta_4
+from cosim.export.equations.model import runge_kutta_4
 from cosim.export.fmu.block import Block
 
 from ..common.contact_maps import FreeContactMaps, create_symbols
-from ..common.interface import WORLD_OUTPUTS
 from ..common.named_values import ConstantsMap, NamedValues, values_by_name, variables_of
 from ..common.rigid_body import (
     RIGID_BODY_STATE_COUNT,
+    SteppedModel,
     initial_rigid_state,
     lagging_speeds,
     motion_of_state,
@@ -62,6 +60,7 @@ from ..common.rigid_body import (
     rigid_body,
     rigid_body_rate,
     symmetric_matrix,
+    with_world_outputs,
 )
 from ..common.water_surface import SURFACE_SUM
 from .airframe import MAX_ROTORS, Airframe, Rotor, RotorEffects
@@ -91,11 +90,6 @@ class SpinningRotors(NamedTuple):
     aerodynamic_speed: ca.SX
     momentum: ca.SX
     momentum_rate: ca.SX
-
-
-#: function of (state, rotors, reductions of the inflow, inputs, constants) to the rate of the
-#: rigid-body states
-BodyRate = Callable[[ca.SX, SpinningRotors, ca.SX, NamedValues, NamedValues], ca.SX]
 
 
 @dataclass(frozen=True)
@@ -147,12 +141,6 @@ class MultirotorEquations:
             * ca.repmat(turning, 3, 1),
         }
 
-    @cached_property
-    def input_names(self) -> list[str]:
-        """Names of the scalar inputs."""
-        inputs = variables_of(self.variables, "input")
-        return [*chain.from_iterable(variable.scalar_names for variable in inputs)]
-
     def _inputs(self, vector: ca.SX) -> NamedValues:
         return values_by_name(vector, variables_of(self.variables, "input"))
 
@@ -192,18 +180,16 @@ class MultirotorEquations:
         return ca.vertcat(normalised_state(end), speed)
 
     def step_with_effects(
-        self, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX
+        self,
+        state: ca.SX,
+        inputs: ca.SX,
+        constants: ca.SX,
+        step: ca.SX,
+        *,
+        in_water: bool = False,
     ) -> ca.SX:
-        """Return the state after a step (s) in air with all effects."""
-        return self._step(self._body_rate, state, inputs, constants, step)
-
-    def step_in_water(self, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX) -> ca.SX:
-        """Return the state after a step (s) with all effects and the loads of water."""
-        return self._step(self._rate_in_water, state, inputs, constants, step)
-
-    def _step(
-        self, body_rate: BodyRate, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX
-    ) -> ca.SX:
+        """Return the state after a step (s) with all effects, in air or with the loads of water."""
+        body_rate = self._rate_in_water if in_water else self._body_rate
         given, known = self._inputs(inputs), self.constants.by_name(constants)
         target = self._commanded_speeds(given, known)
         start, middle, end = lagging_speeds(
@@ -264,27 +250,14 @@ def _spinning_rotors(speed: ca.SX, target: ca.SX, constants: NamedValues) -> Spi
     return SpinningRotors(speed, constants["momenta"] @ speed, constants["momenta"] @ rate)
 
 
-@dataclass(frozen=True)
-class Multirotor(ContinuousModel):
-    """A multirotor in free flight that is integrated by the compiled function `free_step`."""
-
-    free_step: ca.Function = field(kw_only=True)
-
-    def integrate(
-        self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1
-    ) -> ca.SX:
-        """Return the state after `step` (s) with held inputs, in equal sub-steps."""
-        for _ in range(sub_steps):
-            state = self.free_step(state, inputs, parameters, step / sub_steps)
-        return state
-
-
 def free_step(equations: MultirotorEquations) -> Callee:
     """Return the function of one step.
 
     Its C code calls the function for the effects that are on and the water.
     """
-    inputs, names = equations.input_names, list[str]()
+    inputs, names = list[str](), list[str]()
+    for variable in variables_of(equations.variables, "input"):
+        inputs += variable.scalar_names
     for name, (rows, columns) in equations.constants.shapes.items():
         names += [name] * rows * columns
     state_count = len(states(equations.slots))
@@ -292,7 +265,9 @@ def free_step(equations: MultirotorEquations) -> Callee:
     arguments = [*create_symbols(**sizes).values()]
     plain = ca.Function("plain_step", arguments, [equations.step_without_effects(*arguments)])
     full = ca.Function("step_with_effects", arguments, [equations.step_with_effects(*arguments)])
-    wet = ca.Function("step_in_water", arguments, [equations.step_in_water(*arguments)])
+    wet = ca.Function(
+        "step_in_water", arguments, [equations.step_with_effects(*arguments, in_water=True)]
+    )
     either = ca.Function("free_step", arguments, [full(*arguments)], {"never_inline": True})
     effects = [k for k, name in enumerate(names) if name.partition(".")[0] in _EFFECTS]
     body = _FREE_STEP_C % {
@@ -351,19 +326,17 @@ def multirotor_block(airframe: Airframe, description: str, rotor_slots: int | No
     equations = MultirotorEquations(airframe, rotor_slots or len(airframe.rotors))
     step, functions = free_step(equations), equations.rotor_functions
     surroundings, surroundings_callee = create_surroundings_function()
-    model = Multirotor(
+    model = SteppedModel(
         airframe.name,
         description,
         equations.variables,
         states(equations.slots),
         equations.initial_state,
         equations.rate,
-        lambda state, _inputs, _constants: ca.vertcat(
-            motion_of_state(state), ca.SX.zeros(len(WORLD_OUTPUTS))
-        ),
+        lambda state, _inputs, _constants: with_world_outputs(motion_of_state(state)),
         derived_parameters=equations.constants.vector,
         callees=[step, *functions.callees, surroundings_callee, SURFACE_SUM],
-        free_step=step.function,
+        step=step.function,
     )
     maps = FreeContactMaps(model, lambda c: rigid_body(equations.constants.by_name(c)))
     return as_block(model, [*maps.functions(), surroundings])

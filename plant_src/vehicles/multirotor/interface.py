@@ -6,20 +6,18 @@ all multirotors in a world are compiled once, for MAX_ROTORS rotors. Elements wi
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from cosim.core.component import Variable
 
 from ..common.interface import (
     CURRENT_INPUTS,
     EXTERNAL_LOADS,
     FREE_STATES,
-    GROUND_DISTANCE_INPUT,
-    GROUND_SHARE_INPUT,
+    GROUND_INPUTS,
     MOTION_OUTPUTS,
     WATER_LEVEL_INPUT,
     WIND_INPUTS,
     WORLD_OUTPUTS,
+    attribute_parameters,
     element_commands,
     element_labels,
     element_parameters,
@@ -28,7 +26,6 @@ from ..common.interface import (
     initial_variables,
     parameter,
     scalar_variable,
-    vector_parameters,
 )
 from .airframe import Airframe
 
@@ -50,18 +47,36 @@ def variables(airframe: Airframe, rotor_slots: int | None = None) -> tuple[Varia
         rotor_slots: Number of elements of the arrays of the rotors. None means the number of
             rotors.
     """
-    slots = len(airframe.rotors) if rotor_slots is None else rotor_slots
+    count, limit = len(airframe.rotors), f"0 ... {airframe.max_rotor_speed:.4g} rad/s"
+    slots = count if rotor_slots is None else rotor_slots
+    labels = element_labels([rotor.label for rotor in airframe.rotors], slots, "rotor_count")
+    ground = "fraction of the ground effect; 0: none"
     return (
         *initial_variables("xyz", "uvw", "pqr"),
-        *_rigid_body_variables(airframe),
-        *_hull_parameters(airframe),
-        *_rotor_parameters(airframe, slots),
-        *_effect_parameters(airframe),
+        # `airframe.Airframe` checks the values of mass and inertia
+        *inertia_variables(airframe.mass, airframe.inertia, "total mass with rotors and payload"),
+        scalar_variable(
+            "gravity", "m/s2", "gravitational acceleration", "parameter", airframe.gravity
+        ),
+        *attribute_parameters(airframe.hull, _HULL_PARAMETERS),
+        parameter("rotor_count", "1", float(count), "number of rotors", 1.0, float(slots)),
+        *element_parameters("rotor", airframe.rotors, _ROTOR_COLUMNS, slots),
+        *attribute_parameters(airframe, _ROTOR_PARAMETERS),
+        parameter(
+            "initial_rotor_speed", "rad/s", 0.0, "initial speed of all rotors, if they lag", 0.0
+        ),
+        *attribute_parameters(airframe.effects, _EFFECT_PARAMETERS),
+        parameter("ground_effect", "1", airframe.effects.ground_effect, ground, 0.0, 1.0),
+        *attribute_parameters(airframe.effects, _LIFT_PARAMETERS),
         *EXTERNAL_LOADS,
-        _rotor_speed_variable(airframe, slots),
+        element_commands(
+            "rotor_speed",
+            "rad/s",
+            f"commanded rotor speeds ({labels}), limited to {limit}",
+            slots,
+        ),
         *WIND_INPUTS,
-        *GROUND_DISTANCE_INPUT,
-        *GROUND_SHARE_INPUT,
+        *GROUND_INPUTS,
         *WATER_LEVEL_INPUT,
         *CURRENT_INPUTS,
         *MOTION_OUTPUTS,
@@ -79,27 +94,57 @@ def table_rows(rotor_slots: int) -> int:
     return -(-rotor_slots // _TABLE_ROW_MULTIPLE) * _TABLE_ROW_MULTIPLE
 
 
-def _rigid_body_variables(airframe: Airframe) -> tuple[Variable, ...]:
-    """Return mass and inertia; `airframe.Airframe` checks their values."""
-    gravity = scalar_variable(
-        "gravity", "m/s2", "gravitational acceleration", "parameter", airframe.gravity
-    )
-    return (
-        *inertia_variables(airframe.mass, airframe.inertia, "total mass with rotors and payload"),
-        gravity,
-    )
+#: attribute, and name, unit, smallest value and description of its parameter
+_HULL_PARAMETERS = (
+    ("size", "hull_size", "m", 0.0, "edge of the box around the body, for forces in water"),
+    (
+        "volume",
+        "displaced_volume",
+        "m3",
+        0.0,
+        "volume of water that the submerged vehicle displaces",
+    ),
+    (
+        "drag_coefficient",
+        "water_drag_coefficient",
+        "1",
+        0.0,
+        "drag coefficient of the body in water",
+    ),
+)
+_ROTOR_PARAMETERS = (
+    ("max_rotor_speed", "max_rotor_speed", "rad/s", 0.0, "upper limit of the rotor speeds"),
+    ("rotor_radius", "rotor_radius", "m", 0.0, "radius of the rotors"),
+)
+_EFFECT_PARAMETERS = (
+    (
+        "rotor_time_constant",
+        "rotor_time_constant",
+        "s",
+        0.0,
+        "time constant of the rotor speeds; 0: no lag",
+    ),
+    (
+        "rotor_inertia",
+        "rotor_inertia",
+        "kg.m2",
+        0.0,
+        "moment of inertia of a rotor with its motor; 0: no gyroscopic torque",
+    ),
+    ("rotor_drag", "rotor_drag", "kg/rad", 0.0, "drag of a rotor over its speed and air speed"),
+    ("body_drag", "body_drag", "kg/m", 0.0, "drag of the body over squared air speed"),
+)
+_LIFT_PARAMETERS = (
+    (
+        "translational_lift",
+        "translational_lift",
+        "kg/m",
+        0.0,
+        "thrust of a rotor over the squared air speed in its plane",
+    ),
+)
 
-
-def _hull_parameters(airframe: Airframe) -> Iterator[Variable]:
-    hull = airframe.hull
-    text = "edge of the box around the body, for forces in water"
-    yield from vector_parameters("hull_size", "m", hull.size, text, 0.0)
-    text = "volume of water that the submerged vehicle displaces"
-    yield parameter("displaced_volume", "m3", hull.volume, text, 0.0)
-    text = "drag coefficient of the body in water"
-    yield parameter("water_drag_coefficient", "1", hull.drag_coefficient, text, 0.0)
-
-
+#: attribute of a rotor, and name, unit and description of its array
 _ROTOR_COLUMNS = (
     ("position", "rotor_position", "m", "position of the hubs"),
     ("axis", "rotor_axis", "1", "unit vectors of the thrusts"),
@@ -119,38 +164,3 @@ _ROTOR_COLUMNS = (
         "inertia only",
     ),
 )
-
-
-def _rotor_parameters(airframe: Airframe, slots: int) -> Iterator[Variable]:
-    """Yield the number of rotors, their arrays, and what they have in common."""
-    count = float(len(airframe.rotors))
-    yield parameter("rotor_count", "1", count, "number of rotors", 1.0, float(slots))
-    yield from element_parameters("rotor", airframe.rotors, _ROTOR_COLUMNS, slots)
-    limit = airframe.max_rotor_speed
-    yield parameter("max_rotor_speed", "rad/s", limit, "upper limit of the rotor speeds", 0.0)
-    yield parameter("rotor_radius", "m", airframe.rotor_radius, "radius of the rotors", 0.0)
-
-
-def _rotor_speed_variable(airframe: Airframe, slots: int) -> Variable:
-    labels = element_labels([rotor.label for rotor in airframe.rotors], slots, "rotor_count")
-    limit = f"limited to 0 ... {airframe.max_rotor_speed:.4g} rad/s"
-    text = f"commanded rotor speeds ({labels}), {limit}"
-    return element_commands("rotor_speed", "rad/s", text, slots)
-
-
-def _effect_parameters(airframe: Airframe) -> Iterator[Variable]:
-    effects = airframe.effects
-    text = "initial speed of all rotors, if they lag"
-    yield parameter("initial_rotor_speed", "rad/s", 0.0, text, 0.0)
-    text = "time constant of the rotor speeds; 0: no lag"
-    yield parameter("rotor_time_constant", "s", effects.rotor_time_constant, text, 0.0)
-    text = "moment of inertia of a rotor with its motor; 0: no gyroscopic torque"
-    yield parameter("rotor_inertia", "kg.m2", effects.rotor_inertia, text, 0.0)
-    text = "drag of a rotor over its speed and air speed"
-    yield from vector_parameters("rotor_drag", "kg/rad", effects.rotor_drag, text, 0.0)
-    text = "drag of the body over squared air speed"
-    yield from vector_parameters("body_drag", "kg/m", effects.body_drag, text, 0.0)
-    text = "fraction of the ground effect; 0: none"
-    yield parameter("ground_effect", "1", effects.ground_effect, text, 0.0, 1.0)
-    text = "thrust of a rotor over the squared air speed in its plane"
-    yield parameter("translational_lift", "kg/m", effects.translational_lift, text, 0.0)

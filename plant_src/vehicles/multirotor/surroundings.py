@@ -60,7 +60,9 @@ def create_surroundings_function() -> tuple[ca.Function, Callee]:
     arguments = pose, disc, sea, waves, count, row = [
         ca.SX.sym(name, size) for name, size in sizes.items()
     ]
-    elevation, point = create_elevation_function(), _disc_centre_function()
+    centre_of_rotors = pose[0:3] + kinematics.rotation_matrix(pose[3:7]) @ disc[0:3]
+    point = ca.Function("disc_centre", [pose, disc], [centre_of_rotors])
+    elevation = create_elevation_function()
     surface = _surface_function()
     centre = point(pose, disc)
     height, share = ca.vertsplit(surface(centre, disc[3], row))
@@ -81,14 +83,6 @@ def create_surroundings_function() -> tuple[ca.Function, Callee]:
     callee = Callee(reference, body, [elevation, point, surface])
     results = call_in_c(reference, *arguments)
     return ca.Function("surroundings", arguments, results, [*sizes], ["surroundings"]), callee
-
-
-def _disc_centre_function() -> ca.Function:
-    """Return the function from pose and disc to the centre of the rotors (m, world frame)."""
-    pose, disc = ca.SX.sym("pose", 7), ca.SX.sym("disc", 5)
-    return ca.Function(
-        "disc_centre", [pose, disc], [pose[0:3] + kinematics.rotation_matrix(pose[3:7]) @ disc[0:3]]
-    )
 
 
 def _surface_function() -> ca.Function:

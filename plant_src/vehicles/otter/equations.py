@@ -28,7 +28,7 @@ from ..vessel.hull import (
     weight_and_buoyancy,
 )
 from ..vessel.strips import STATION_COUNT, STRIP_COUNT, Box, TwinHull, equivalent_strips, immersion
-from ..vessel.vessel_equations import VesselModel, constant_body, floating_block, wave_table_of
+from ..vessel.vessel_equations import VesselModel, floating_block, wave_table_of
 from . import parameters as p
 from .interface import PROPELLER_STATES, VARIABLES
 from .loads import (
@@ -97,24 +97,24 @@ def station_draughts(equilibrium: ca.SX) -> ca.SX:
 
 def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     """Return the constants of the equations."""
-    own = mass_properties(parameters)
-    ballast = Ballast(own.mass, own.centre, ca.SX(p.WATER_DENSITY))
-    volume = own.mass / p.WATER_DENSITY
+    mass, centre_of_mass, own_inertia = mass_properties(parameters)
+    ballast = Ballast(mass, centre_of_mass, ca.SX(p.WATER_DENSITY))
+    volume = mass / p.WATER_DENSITY
     equilibrium = _equilibrium(ballast)
     to_level = attitude_at(equilibrium)
-    centre, inertia = to_level @ own.centre, to_level @ own.inertia @ to_level.T
+    centre, inertia = to_level @ centre_of_mass, to_level @ own_inertia @ to_level.T
     draughts, mean_draught = station_draughts(equilibrium), volume / p.WATERPLANE_AREA
     buoyancy = _centre_of_buoyancy(equilibrium, draughts, mean_draught)
-    added = added_mass(own.inertia)
-    mass_matrix = rigid_body_mass_matrix(own.mass, centre, inertia) + ca.diag(added)
+    added = added_mass(own_inertia)
+    mass_matrix = rigid_body_mass_matrix(mass, centre, inertia) + ca.diag(added)
     stiffness = _WEIGHT_DENSITY * ca.vertcat(
         p.WATERPLANE_AREA, _MOMENTS + volume * (buoyancy[2] - centre[2])
     )
     pontoons = resting_pontoons(draughts, mean_draught)
     return {
         **initial_parameters(parameters),
-        "mass": own.mass,
-        "centre_of_mass": own.centre,
+        "mass": mass,
+        "centre_of_mass": centre_of_mass,
         "centre_in_level_axes": centre,
         "centre_of_buoyancy": buoyancy,
         "inertia": inertia,
@@ -218,4 +218,4 @@ VESSEL = VesselModel(
 
 def block() -> Block:
     """Return the Otter for export."""
-    return floating_block(otter_model(VESSEL), VESSEL, constant_body(p.BODY))
+    return floating_block(otter_model(VESSEL), VESSEL, p.BODY)

@@ -20,23 +20,13 @@ from . import parameters as p
 from .interface import VARIABLES
 
 
-@dataclass(frozen=True)
-class MassProperties:
-    """Mass of hull and payload.
+def mass_properties(parameters: NamedValues) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Return the mass of the hull with the payload of these parameters.
 
-    Attributes:
-        mass: Mass (kg).
-        centre: Centre of mass from O (m, body frame), shape (3,).
-        inertia: Inertia about the centre of mass (kg m2, body frame), shape (3, 3).
+    Returns:
+        Mass (kg), centre of mass from O (m, body frame), shape (3,), and inertia about the centre
+        of mass (kg m2, body frame), shape (3, 3).
     """
-
-    mass: ca.SX
-    centre: ca.SX
-    inertia: ca.SX
-
-
-def mass_properties(parameters: NamedValues) -> MassProperties:
-    """Return the mass of the hull with the payload of these parameters."""
     payload, position = parameters["payload_mass"], parameters["payload_position"]
     hull_centre = ca.SX(p.HULL_CENTRE)
     mass = p.HULL_MASS + payload
@@ -45,7 +35,7 @@ def mass_properties(parameters: NamedValues) -> MassProperties:
     for part, point in ((p.HULL_MASS, hull_centre), (payload, position)):
         lever = ca.skew(point - centre)
         inertia -= part * lever @ lever
-    return MassProperties(mass, centre, inertia)
+    return mass, centre, inertia
 
 
 def added_mass(inertia: ca.SX) -> ca.SX:

@@ -141,10 +141,9 @@ def _pontoon_box(side: float) -> Box:
     return Box(half_extents, (0.0, side * PONTOON_OFFSET, (PONTOON_TOP + PONTOON_BOTTOM) / 2))
 
 
-def _deck_box() -> Box:
-    x, y, z = DECK_SIZE
-    return Box((x / 2, y / 2, z / 2), (DECK_CENTRE[0], DECK_CENTRE[1], DECK_CENTRE[2] - z / 2))
-
-
+_DECK_BOX = Box(
+    (DECK_SIZE[0] / 2, DECK_SIZE[1] / 2, DECK_SIZE[2] / 2),
+    (*DECK_CENTRE[:2], DECK_CENTRE[2] - DECK_SIZE[2] / 2),
+)
 _ROLL, _PITCH, _YAW = (HULL_MASS * radius**2 for radius in RADII_OF_GYRATION)
-BODY = Body(HULL_MASS, (_ROLL, _PITCH, _YAW), (_deck_box(), _pontoon_box(+1.0), _pontoon_box(-1.0)))
+BODY = Body(HULL_MASS, (_ROLL, _PITCH, _YAW), (_DECK_BOX, _pontoon_box(+1.0), _pontoon_box(-1.0)))

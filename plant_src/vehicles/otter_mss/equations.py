@@ -6,7 +6,6 @@ README.md has the loads, `vehicles/README.md` the rest.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import casadi as ca
 
@@ -36,7 +35,7 @@ from ..vessel.hull import (
     transformation_matrix,
 )
 from ..vessel.strips import TwinHull, equivalent_strips
-from ..vessel.vessel_equations import VesselModel, constant_body, floating_block, wave_table_of
+from ..vessel.vessel_equations import VesselModel, floating_block, wave_table_of
 
 _CENTRE_OF_FLOTATION = ca.SX(p.CENTRE_OF_FLOTATION)
 _STRIPS = equivalent_strips(
@@ -46,27 +45,14 @@ _STRIPS = equivalent_strips(
 )
 
 
-@dataclass(frozen=True)
-class Hydrostatics:
-    """Hydrostatics for one mass and centre of mass.
+def hydrostatics(mass: ca.SX, centre: ca.SX) -> dict[str, ca.SX]:
+    """Return the hydrostatics for a mass (kg) and a centre of mass (m, body frame).
 
-    Attributes:
-        draught: Draught (m).
-        stiffness: Restoring stiffness of heave (N/m), roll and pitch (N m/rad) at the centre of
-            flotation, shape (3,).
-        compliance: Heave (m), roll and pitch (rad) over heave force (N), roll and pitch moment (N
-            m) at O, shape (3, 3).
-        mean_draught: Volume over waterplane (m).
+    Returns:
+        "draught" (m); "stiffness", the restoring stiffness of heave (N/m), roll and pitch (N m/rad)
+        at the centre of flotation, shape (3,); "compliance", heave (m), roll and pitch (rad) over
+        heave force (N), roll and pitch moment (N m) at O, shape (3, 3).
     """
-
-    draught: ca.SX
-    stiffness: ca.SX
-    compliance: ca.SX
-    mean_draught: ca.SX
-
-
-def hydrostatics(mass: ca.SX, centre: ca.SX) -> Hydrostatics:
-    """Return the hydrostatics for a mass (kg) and a centre of mass (m, body frame)."""
     volume = mass / p.WATER_DENSITY
     draught = volume / (2 * p.BLOCK_COEFFICIENT * p.PONTOON_BEAM * p.LENGTH)
     moments = ca.SX([p.TRANSVERSE_MOMENT, p.MSS_LONGITUDINAL_MOMENT])
@@ -76,32 +62,38 @@ def hydrostatics(mass: ca.SX, centre: ca.SX) -> Hydrostatics:
     stiffness = ca.vertcat(weight * p.WATERPLANE_AREA, weight * volume * metacentric_heights)
     to_flotation = transformation_matrix(ca.SX(p.CENTRE_OF_FLOTATION))[2:5, 2:5]
     compliance = ca.inv(to_flotation.T @ ca.diag(stiffness) @ to_flotation)
-    return Hydrostatics(draught, stiffness, compliance, volume / p.WATERPLANE_AREA)
+    return {"draught": draught, "stiffness": stiffness, "compliance": compliance}
 
 
 def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     """Return the constants of the equations."""
-    payload, own = parameters["payload_mass"], mass_properties(parameters)
-    added = added_mass(own.inertia)
-    mass_matrix = rigid_body_mass_matrix(own.mass, own.centre, own.inertia) + ca.diag(added)
-    floating = hydrostatics(own.mass, own.centre)
+    mass, centre, inertia = mass_properties(parameters)
+    added = added_mass(inertia)
+    mass_matrix = rigid_body_mass_matrix(mass, centre, inertia) + ca.diag(added)
+    floating = hydrostatics(mass, centre)
+    # pontoons for the mean draught, volume over waterplane
+    pontoons = TwinHull(
+        _STRIPS,
+        ca.SX(p.PONTOON_BEAM),
+        mass / p.WATER_DENSITY / p.WATERPLANE_AREA,
+        ca.SX(p.PONTOON_TOP - p.PONTOON_BOTTOM),
+        ca.SX(p.WATERPLANE_AREA),
+    )
     constants = {
         **initial_parameters(parameters),
-        "mass": own.mass,
-        "centre_of_mass": own.centre,
-        "inertia": own.inertia,
+        "mass": mass,
+        "centre_of_mass": centre,
+        "inertia": inertia,
         "added_mass": added,
         "inverse_mass_matrix": ca.inv(mass_matrix),
-        "draught": floating.draught,
-        "stiffness": floating.stiffness,
-        "compliance": floating.compliance,
-        "damping": linear_damping(ca.diag(mass_matrix), floating.stiffness),
-        "drag": cross_flow_drag(floating.draught),
-        "payload_force": -payload * p.GRAVITY,
+        **floating,
+        "damping": linear_damping(ca.diag(mass_matrix), floating["stiffness"]),
+        "drag": cross_flow_drag(floating["draught"]),
+        "payload_force": -parameters["payload_mass"] * p.GRAVITY,
         "payload_position": parameters["payload_position"],
         "propeller_time_constant": parameters["propeller_time_constant"],
         "wave.count": parameters["wave.count"],
-        "wave_table": wave_table_of(parameters, _twin_hull(floating.mean_draught)),
+        "wave_table": wave_table_of(parameters, pontoons),
     }
     return constants | {"equilibrium": _equilibrium(constants)}
 
@@ -168,17 +160,6 @@ def hull(constants: NamedValues) -> Hull:
     )
 
 
-def _twin_hull(draught: ca.SX) -> TwinHull:
-    """Return the pontoons for a mean draught (m)."""
-    return TwinHull(
-        _STRIPS,
-        ca.SX(p.PONTOON_BEAM),
-        draught,
-        ca.SX(p.PONTOON_TOP - p.PONTOON_BOTTOM),
-        ca.SX(p.WATERPLANE_AREA),
-    )
-
-
 def restoring(constants: NamedValues, now: LoadArguments) -> ca.SX:
     """Return the restoring load tau.
 
@@ -204,4 +185,4 @@ VESSEL = VesselModel(
 
 def block() -> Block:
     """Return the Otter of MSS for export."""
-    return floating_block(otter_model(VESSEL), VESSEL, constant_body(p.BODY))
+    return floating_block(otter_model(VESSEL), VESSEL, p.BODY)

@@ -15,18 +15,14 @@ binary holds the equations of all planar vessels; all values are parameters.
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import casadi as ca
 import numpy as np
 
-from cosim.core.component import Variable
 from cosim.export.equations.fmu_code import as_block
 from cosim.export.equations.model import ContinuousModel
 from cosim.export.fmu.block import Block
 
 from ..common.elementary_functions import sine_and_cosine
-from ..common.interface import WORLD_OUTPUTS
 from ..common.named_values import (
     ConstantsMap,
     NamedValues,
@@ -34,6 +30,7 @@ from ..common.named_values import (
     values_by_name,
     variables_of,
 )
+from ..common.rigid_body import with_world_outputs
 from ..vessel import planar_maps, propulsion
 from ..vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS, Propeller
 from .interface import states, variables
@@ -43,63 +40,29 @@ _BODY_STATES = 6
 _FAR_BELOW = 1e3  # m; propellers of planar vessels are always immersed
 
 
-class PlanarEquations:
-    """Equations of a planar vessel.
+def planar_vessel_model(
+    vessel: PlanarVessel, description: str, slots: tuple[int, int]
+) -> ContinuousModel:
+    """Return the model to export of a planar vessel; its contact outputs are 0.
 
     Args:
         vessel: Vessel with the start values.
-        slots: Numbers of elements of the arrays of propellers and rudders.
-        identifier: Name of the FMU.
         description: Description of the FMU.
+        slots: Numbers of elements of the arrays of propellers and rudders.
     """
-
-    def __init__(
-        self, vessel: PlanarVessel, slots: tuple[int, int], identifier: str, description: str
-    ):
-        self.variables: tuple[Variable, ...] = variables(vessel, slots)
-        self.slots, self.identifier, self.description = slots, identifier, description
-
-    @cached_property
-    def constants(self) -> ConstantsMap:
-        """Map from the parameters to the constants of the equations."""
-        return ConstantsMap(self.variables, derive_constants)
-
-    @cached_property
-    def model(self) -> ContinuousModel:
-        """Model to export; its contact outputs are 0."""
-        return ContinuousModel(
-            self.identifier,
-            self.description,
-            self.variables,
-            states(self.slots[0]),
-            lambda constants: initial_state(self.constants.by_name(constants), self.slots[0]),
-            lambda state, inputs, constants: rate(
-                state,
-                values_by_name(inputs, variables_of(self.variables, "input")),
-                self.constants.by_name(constants),
-            ),
-            lambda state, _inputs, constants: ca.vertcat(
-                self.observe(state, constants), ca.SX.zeros(len(WORLD_OUTPUTS))
-            ),
-            derived_parameters=self.constants.vector,
-            callees=(propulsion.PROPELLER_SUM, *([propulsion.RUDDER_SUM] if self.slots[1] else [])),
-        )
-
-    def observe(self, state: ca.SX, constants: ca.SX) -> ca.SX:
-        """Return the motion outputs of the vessel and of its landing deck."""
-        return observe(state, self.constants.by_name(constants))
-
-    def block(self) -> Block:
-        """Return the vessel for export: its FMU and the contact functions of the world."""
-
-        def body(constants: ca.SX) -> planar_maps.PlanarBody:
-            known = self.constants.by_name(constants)
-            return planar_maps.PlanarBody(
-                known["mass"], known["yaw_inertia"], known["height"] + known["centre_of_mass"][2]
-            )
-
-        model = self.model.with_called_derivatives()
-        return as_block(model, planar_maps.PlanarContactMaps(model, body, self.observe).functions())
+    declared = variables(vessel, slots)
+    constants, given = ConstantsMap(declared, derive_constants), variables_of(declared, "input")
+    return ContinuousModel(
+        vessel.name,
+        description,
+        declared,
+        states(slots[0]),
+        lambda c: initial_state(constants.by_name(c), slots[0]),
+        lambda x, u, c: rate(x, values_by_name(u, given), constants.by_name(c)),
+        lambda x, _u, c: with_world_outputs(observe(x, constants.by_name(c))),
+        derived_parameters=constants.vector,
+        callees=(propulsion.PROPELLER_SUM, *([propulsion.RUDDER_SUM] if slots[1] else [])),
+    )
 
 
 def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
@@ -128,26 +91,22 @@ def rate(state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
     relative = absolute - ca.vertcat(current, 0)
     air = absolute[0:2] - to_body @ inputs["wind"][0:2]
     actuators = state[_BODY_STATES:]
-    load = water_loads(actuators, relative, inputs, constants) + air_load(air, constants)
+    load = water_loads(actuators, relative, inputs, constants)
+    drag = -constants["air_drag"] * ca.fabs(air) * air
+    load += _load_at(constants["air_centre"], drag)
     load += _load_at(constants["centre_of_mass"], to_body @ inputs["external_force"][0:2])
     load += ca.vertcat(0, 0, inputs["external_torque.z"])
     added = square_matrix(constants["coriolis_added_mass"])
     load -= coriolis(constants["rigid_body_mass"], relative) + coriolis(added, relative)
-    acceleration = constants["inverse_mass_matrix"] @ load + current_rate(current, r)
+    acceleration = constants["inverse_mass_matrix"] @ load
+    # rate of a steady current in the axes of the turning vessel
+    acceleration += ca.vertcat(r * current[1], -r * current[0], 0)
     yaw_acceleration = acceleration[2]
     centre = acceleration[0:2] + yaw_acceleration * ca.vertcat(-y, x)
     kinematic = ca.vertcat(to_body.T @ ca.vertcat(u, v), r)
     return ca.vertcat(
         kinematic, centre, yaw_acceleration, propulsion.speed_rates(actuators, inputs, constants)
     )
-
-
-def current_rate(current: ca.SX, r: ca.SX) -> ca.SX:
-    """Return the time derivative of a steady current in the axes of a turning vessel (m/s2).
-
-    The vessel turns with the rate r (rad/s).
-    """
-    return ca.vertcat(r * current[1], -r * current[0], 0)
 
 
 def coriolis(mass: ca.SX, nu: ca.SX) -> ca.SX:
@@ -174,11 +133,6 @@ def water_loads(
     )
     driving += propulsion.rudder_loads(speed, flow, inputs, constants)
     return ca.vertcat(driving[0:2], driving[5]) - load
-
-
-def air_load(air: ca.SX, constants: NamedValues) -> ca.SX:
-    """Return the load (X, Y, N) about O of the air for a velocity relative to it (m/s, (2,))."""
-    return _load_at(constants["air_centre"], -constants["air_drag"] * ca.fabs(air) * air)
 
 
 def _load_at(point: ca.SX, force: ca.SX) -> ca.SX:
@@ -210,7 +164,18 @@ def planar_vessel_block(
         description: Description of the FMU.
         slots: Numbers of slots of propellers and rudders. None means the numbers of the vessel.
     """
-    return PlanarEquations(vessel, slots or vessel.slots, vessel.name, description).block()
+    model = planar_vessel_model(vessel, description, slots or vessel.slots)
+    model = model.with_called_derivatives()
+    by_name = ConstantsMap(model.variables, derive_constants).by_name
+
+    def body(constants: ca.SX) -> planar_maps.PlanarBody:
+        known = by_name(constants)
+        return planar_maps.PlanarBody(
+            known["mass"], known["yaw_inertia"], known["height"] + known["centre_of_mass"][2]
+        )
+
+    maps = planar_maps.PlanarContactMaps(model, body, lambda x, c: observe(x, by_name(c)))
+    return as_block(model, maps.functions())
 
 
 _ZERO = np.zeros((3, 3))

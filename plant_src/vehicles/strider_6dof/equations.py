@@ -30,7 +30,7 @@ from ..strider.parameters import (
 )
 from ..vessel.hull import Hull, LoadArguments, load_of_force_at
 from ..vessel.strips import Immersion, TwinHull, equivalent_strips, immersion
-from ..vessel.vessel_equations import VesselModel, constant_body, floating_block, wave_table_of
+from ..vessel.vessel_equations import VesselModel, floating_block, wave_table_of
 from . import parameters as p
 from .interface import VARIABLES
 from .parameters import BODY
@@ -151,4 +151,4 @@ VESSEL = VesselModel(
 
 def block() -> Block:
     """Return the catamaran for export."""
-    return floating_block(VESSEL.create_continuous_model(), VESSEL, constant_body(BODY))
+    return floating_block(VESSEL.create_continuous_model(), VESSEL, BODY)

@@ -137,23 +137,27 @@ class SubmergedReader(VehicleReader[Craft]):
 
     def read_values(self, data: Mapping[str, Any]) -> dict[str, Any]:
         """Read the attributes of the craft, and the collision shape."""
-        common = self.read_data(
-            data.get("thruster"), ("thruster",), THRUSTER_KEYS, _THRUSTER_OPTIONAL_KEYS
-        )
+        path = ("thruster",)
+        common = self.read_data(data.get("thruster"), path, THRUSTER_KEYS, _THRUSTER_OPTIONAL_KEYS)
         boxes = self.read_boxes(data)
         return {
             "boxes": boxes,
             **self.read_volume(data, boxes),
-            **self.read_propulsion(common),
+            "max_thruster_speed": self.entry(common, "max_speed", "rad/s", path=path, above=0.0),
+            "thruster_radius": self.entry(common, "radius", "m", path=path, above=0.0),
+            "thruster_time_constant": self.entry(common, "time_constant", "s", 0.0, path, low=0.0),
+            "advance_coefficient": self.entry(
+                common, "advance_coefficient", "kg/rad", 0.0, path, low=0.0
+            ),
             **{
                 matrix: self.read_matrix(data.get(matrix, [1.0] * 6), (matrix,), "uvwpqr")
                 for matrix in MATRICES
             },
             "mass": self.entry(data, "mass", "kg", above=0.0),
-            "inertia": self.read_inertia(data.get("inertia", [1.0] * 3)),
+            "inertia": self.read_inertia(data),
             "thrusters": [
-                self.read_thruster(common, each, ("thrusters", str(i)))
-                for i, each in self.elements(data, "thrusters")
+                self.read_thruster(common, each, place)
+                for place, each in self.elements(data, "thrusters")
             ],
         }
 
@@ -173,18 +177,6 @@ class SubmergedReader(VehicleReader[Craft]):
             "size": size,
             "gravity": self.entry(data, "gravity", "m/s2", 9.81, above=0.0),
             "water_density": self.entry(data, "water_density", "kg/m3", 1025.0, above=0.0),
-        }
-
-    def read_propulsion(self, common: Mapping[str, Any]) -> dict[str, float]:
-        """Read what all thrusters have in common."""
-        path = ("thruster",)
-        lag = self.entry(common, "time_constant", "s", 0.0, path, low=0.0)
-        advance = self.entry(common, "advance_coefficient", "kg/rad", 0.0, path, low=0.0)
-        return {
-            "max_thruster_speed": self.entry(common, "max_speed", "rad/s", path=path, above=0.0),
-            "thruster_radius": self.entry(common, "radius", "m", path=path, above=0.0),
-            "thruster_time_constant": lag,
-            "advance_coefficient": advance,
         }
 
     def read_thruster(self, common: Mapping[str, Any], value: Any, path: JsonPath) -> Thruster:

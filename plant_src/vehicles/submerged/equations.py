@@ -30,7 +30,7 @@ All values are parameters. One binary holds the equations for up to MAX_THRUSTER
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
@@ -40,13 +40,12 @@ import numpy as np
 from cosim.core.component import Variable
 from cosim.export.equations.c_code import call_in_c
 from cosim.export.equations.fmu_code import as_block
-from cosim.export.equations.model import ContinuousModel, runge_kutta_4
+from cosim.export.equations.model import runge_kutta_4
 from cosim.export.fmu.block import Block
 
 from ..common import kinematics
 from ..common.contact_maps import SubmergedContactMaps
 from ..common.elementary_functions import clamp
-from ..common.interface import WORLD_OUTPUTS
 from ..common.named_values import (
     ConstantsMap,
     NamedValues,
@@ -57,12 +56,14 @@ from ..common.named_values import (
 )
 from ..common.rigid_body import (
     RIGID_BODY_STATE_COUNT,
+    SteppedModel,
     initial_rigid_state,
     lagging_speeds,
     motion_of_state,
     normalised_state,
     rigid_body,
     symmetric_matrix,
+    with_world_outputs,
 )
 from .craft import MAX_THRUSTERS, Craft, Thruster
 from .interface import OCTANTS, states, variables
@@ -295,21 +296,6 @@ class SubmergedEquations:
         )
 
 
-@dataclass(frozen=True)
-class SubmergedModel(ContinuousModel):
-    """A submerged vehicle that is integrated by the compiled function `step`."""
-
-    step: ca.Function = field(kw_only=True)
-
-    def integrate(
-        self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1
-    ) -> ca.SX:
-        """Return the state after `step` (s) with held inputs, in equal sub-steps."""
-        for _ in range(sub_steps):
-            state = call_in_c(self.step, state, inputs, parameters, step / sub_steps)[0]
-        return state
-
-
 def submerged_block(craft: Craft, description: str, thruster_slots: int | None = None) -> Block:
     """Return a submerged vehicle for export.
 
@@ -321,18 +307,16 @@ def submerged_block(craft: Craft, description: str, thruster_slots: int | None =
         thruster_slots: Number of thruster slots. None means the number of thrusters.
     """
     equations = SubmergedEquations(craft, thruster_slots or len(craft.thrusters))
-    model = SubmergedModel(
+    model = SteppedModel(
         craft.name,
         description,
         equations.variables,
         states(equations.slots),
         equations.initial_state,
         equations.rate,
-        lambda state, _inputs, _constants: ca.vertcat(
-            motion_of_state(state), ca.SX.zeros(len(WORLD_OUTPUTS))
-        ),
+        lambda state, _inputs, _constants: with_world_outputs(motion_of_state(state)),
         derived_parameters=equations.constants.vector,
-        step=equations.step_function,
+        step=lambda *arguments: call_in_c(equations.step_function, *arguments)[0],
     )
     by_name = equations.constants.by_name
 

@@ -7,7 +7,6 @@ Elements without a thruster are 0.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 from cosim.core.component import Variable
@@ -19,6 +18,7 @@ from ..common.interface import (
     MOTION_OUTPUTS,
     WATER_LEVEL_INPUT,
     WORLD_OUTPUTS,
+    attribute_parameters,
     element_commands,
     element_labels,
     element_parameters,
@@ -26,8 +26,6 @@ from ..common.interface import (
     inertia_variables,
     initial_variables,
     matrix_parameter,
-    parameter,
-    vector_parameters,
 )
 from .craft import MATRICES, Craft
 
@@ -46,13 +44,25 @@ def variables(craft: Craft, thruster_slots: int | None = None) -> tuple[Variable
             thrusters.
     """
     slots = len(craft.thrusters) if thruster_slots is None else thruster_slots
+    labels = element_labels([thruster.label for thruster in craft.thrusters], slots, str(slots))
+    limit = f"{craft.max_thruster_speed:.4g}"
     return (
         *initial_variables("xyz", "uvw", "pqr"),
         *inertia_variables(craft.mass, craft.inertia, "total mass with the enclosed water"),
-        *_water_parameters(craft),
-        *_thruster_parameters(craft, slots),
+        *attribute_parameters(craft, _WATER_PARAMETERS),
+        *(
+            matrix_parameter(name, f"{text}, for u, v, w, p, q, r", getattr(craft, name))
+            for name, text in MATRICES.items()
+        ),
+        *element_parameters("thruster", craft.thrusters, _THRUSTER_COLUMNS, slots),
+        *attribute_parameters(craft, _THRUSTER_PARAMETERS),
         *EXTERNAL_LOADS,
-        _thruster_speed_variable(craft, slots),
+        element_commands(
+            "thruster_speed",
+            "rad/s",
+            f"commanded thruster speeds ({labels}), limited to -{limit} ... {limit} rad/s",
+            slots,
+        ),
         *CURRENT_INPUTS,
         replace(WATER_LEVEL_INPUT[0], start=0.0),
         *MOTION_OUTPUTS,
@@ -65,19 +75,46 @@ def states(thruster_slots: int) -> tuple[str, ...]:
     return (*FREE_STATES, *element_states("thruster_speed", thruster_slots))
 
 
-def _water_parameters(craft: Craft) -> Iterator[Variable]:
-    yield parameter("gravity", "m/s2", craft.gravity, "gravitational acceleration", 0.0)
-    yield parameter("water_density", "kg/m3", craft.water_density, "density of the water", 0.0)
-    text = "volume of water that the submerged vehicle displaces"
-    yield parameter("displaced_volume", "m3", craft.displaced_volume, text, 0.0)
-    centre, text = craft.centre_of_buoyancy, "centre of this volume"
-    yield from vector_parameters("centre_of_buoyancy", "m", centre, text)
-    text = "edge of the box of this volume"
-    yield from vector_parameters("hull_size", "m", craft.size, text, 0.0)
-    for name, text in MATRICES.items():
-        yield matrix_parameter(name, f"{text}, for u, v, w, p, q, r", getattr(craft, name))
+#: attribute, and name, unit, smallest value and description of its parameter
+_WATER_PARAMETERS = (
+    ("gravity", "gravity", "m/s2", 0.0, "gravitational acceleration"),
+    ("water_density", "water_density", "kg/m3", 0.0, "density of the water"),
+    (
+        "displaced_volume",
+        "displaced_volume",
+        "m3",
+        0.0,
+        "volume of water that the submerged vehicle displaces",
+    ),
+    ("centre_of_buoyancy", "centre_of_buoyancy", "m", None, "centre of this volume"),
+    ("size", "hull_size", "m", 0.0, "edge of the box of this volume"),
+)
+_THRUSTER_PARAMETERS = (
+    (
+        "max_thruster_speed",
+        "max_thruster_speed",
+        "rad/s",
+        0.0,
+        "largest magnitude of the speeds",
+    ),
+    ("thruster_radius", "thruster_radius", "m", 0.0, "radius of the propellers"),
+    (
+        "thruster_time_constant",
+        "thruster_time_constant",
+        "s",
+        0.0,
+        "time constant of the thruster speeds; 0: no lag",
+    ),
+    (
+        "advance_coefficient",
+        "advance_coefficient",
+        "kg/rad",
+        0.0,
+        "loss of thrust over speed and axial velocity of the water",
+    ),
+)
 
-
+#: attribute of a thruster, and name, unit and description of its array
 _THRUSTER_COLUMNS = (
     ("position", "thruster_position", "m", "centres of the propellers"),
     ("axis", "thruster_axis", "1", "unit vectors of the thrusts"),
@@ -100,21 +137,3 @@ _THRUSTER_COLUMNS = (
         "reaction torque on the body about the axis over squared speed",
     ),
 )
-
-
-def _thruster_parameters(craft: Craft, slots: int) -> Iterator[Variable]:
-    yield from element_parameters("thruster", craft.thrusters, _THRUSTER_COLUMNS, slots)
-    limit = craft.max_thruster_speed
-    yield parameter("max_thruster_speed", "rad/s", limit, "largest magnitude of the speeds", 0.0)
-    yield parameter("thruster_radius", "m", craft.thruster_radius, "radius of the propellers", 0.0)
-    lag, text = craft.thruster_time_constant, "time constant of the thruster speeds; 0: no lag"
-    yield parameter("thruster_time_constant", "s", lag, text, 0.0)
-    text = "loss of thrust over speed and axial velocity of the water"
-    yield parameter("advance_coefficient", "kg/rad", craft.advance_coefficient, text, 0.0)
-
-
-def _thruster_speed_variable(craft: Craft, slots: int) -> Variable:
-    labels = element_labels([thruster.label for thruster in craft.thrusters], slots, str(slots))
-    limit = f"{craft.max_thruster_speed:.4g}"
-    text = f"commanded thruster speeds ({labels}), limited to -{limit} ... {limit} rad/s"
-    return element_commands("thruster_speed", "rad/s", text, slots)

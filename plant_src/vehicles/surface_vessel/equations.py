@@ -6,13 +6,11 @@ all floating vessels; all values are parameters.
 
 from __future__ import annotations
 
-from functools import cached_property
 from itertools import product
 
 import casadi as ca
 import numpy as np
 
-from cosim.core.component import Variable
 from cosim.export.equations.c_code import call_in_c
 from cosim.export.fmu.block import Block
 
@@ -71,45 +69,26 @@ _HYDROSTATICS = (
 )
 
 
-class FloatingEquations:
-    """Equations of a floating vessel.
+def surface_vessel_model(
+    vessel: SurfaceVessel, description: str, slots: tuple[int, int]
+) -> VesselModel:
+    """Return the equations of a floating vessel.
 
     Args:
         vessel: Vessel with the start values.
-        slots: Numbers of elements of the arrays of propellers and rudders.
-        identifier: Name of the FMU.
         description: Description of the FMU.
+        slots: Numbers of elements of the arrays of propellers and rudders.
     """
-
-    def __init__(
-        self, vessel: SurfaceVessel, slots: tuple[int, int], identifier: str, description: str
-    ):
-        self.variables: tuple[Variable, ...] = variables(vessel, slots)
-        self.slots, self.identifier, self.description = slots, identifier, description
-
-    @cached_property
-    def model(self) -> VesselModel:
-        """Model of the vessel."""
-        return VesselModel(
-            self.identifier,
-            self.description,
-            self.variables,
-            derive_constants,
-            hull,
-            states(self.slots[0])[len(states(0)) :],
-            propulsion.speed_rates,
-            (propulsion.PROPELLER_SUM, *([propulsion.RUDDER_SUM] if self.slots[1] else [])),
-        )
-
-    def block(self) -> Block:
-        """Return the vessel for export: its FMU and the contact functions of the world."""
-        model = self.model.create_continuous_model().with_called_derivatives()
-
-        def body(constants: ca.SX) -> BulletBody:
-            known = self.model.constants.by_name(constants)
-            return BulletBody(known["mass"], ca.diag(known["inertia_tensor"]))
-
-        return floating_block(model, self.model, body)
+    return VesselModel(
+        vessel.name,
+        description,
+        variables(vessel, slots),
+        derive_constants,
+        hull,
+        states(slots[0])[len(states(0)) :],
+        propulsion.speed_rates,
+        (propulsion.PROPELLER_SUM, *([propulsion.RUDDER_SUM] if slots[1] else [])),
+    )
 
 
 def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
@@ -301,7 +280,14 @@ def surface_vessel_block(
         description: Description of the FMU.
         slots: Numbers of slots of propellers and rudders. None means the numbers of the vessel.
     """
-    return FloatingEquations(vessel, slots or vessel.slots, vessel.name, description).block()
+    equations = surface_vessel_model(vessel, description, slots or vessel.slots)
+
+    def body(constants: ca.SX) -> BulletBody:
+        known = equations.constants.by_name(constants)
+        return BulletBody(known["mass"], ca.diag(known["inertia_tensor"]))
+
+    model = equations.create_continuous_model().with_called_derivatives()
+    return floating_block(model, equations, body)
 
 
 #: catamaran of 30 kg with two propellers; the start values of the FMU

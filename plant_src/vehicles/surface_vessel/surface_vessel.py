@@ -70,9 +70,14 @@ class HullForm:
         return self.beam / (3 - self.count)
 
     @property
-    def drag_point(self) -> tuple[float, float]:
-        """Distances ahead and to port of the four points at which the bottom drag acts (m)."""
-        return self.length / 12**0.5, self.offset if self.count == 2 else self.beam / 12**0.5
+    def drag_point_ahead(self) -> float:
+        """Distance ahead of the four points at which the bottom drag acts (m)."""
+        return self.length / 12**0.5
+
+    @property
+    def drag_point_abeam(self) -> float:
+        """Distance of these points to port (m)."""
+        return self.offset if self.count == 2 else self.beam / 12**0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -252,7 +257,7 @@ class SurfaceVesselReader(BoatReader[SurfaceVessel]):
         """Read the attributes of the vessel, and the collision shape."""
         return {
             **self.read_boat(data, self.read_boxes(data)),
-            "inertia": self.read_inertia(data.get("inertia", [1.0] * 3)),
+            "inertia": self.read_inertia(data),
             "quadratic_damping": self.read_nu_matrix(data, "quadratic_damping", [0.0] * 6),
             "hull": self.read_hull(data.get("hull")),
         }

@@ -20,7 +20,7 @@ from cosim.core.component import Variable
 from cosim.core.errors import Problem
 
 from ...json_reader import JsonPath
-from ..common.interface import matrix_parameter, parameter, vector_parameters
+from ..common.interface import attribute_parameters, matrix_parameter
 from ..common.shapes import Vector, eigenvalue_problems, symmetry_problems
 from ..common.vehicle_reader import Collision, CollisionBox, Vehicle, VehicleReader
 from .actuators import MAX_PROPELLERS, MAX_RUDDERS, MIN_TIME_CONSTANT, Propeller, Rudder
@@ -88,21 +88,26 @@ class Boat(Vehicle):
 
 def boat_parameters(boat: Boat, velocities: str) -> Iterator[Variable]:
     """Yield the parameters of both families; `velocities` are the names of the elements of nu."""
-    centre, text = boat.centre_of_mass, "centre of mass from O"
-    yield from vector_parameters("centre_of_mass", "m", centre, text)
-    yield parameter("water_density", "kg/m3", boat.water_density, "density of the water", 0.0)
+    yield from attribute_parameters(boat, _MASS_PARAMETERS)
     for name, text in (
         ("added_mass", "added mass about O"),
         ("coriolis_added_mass", "added mass in the Coriolis loads"),
         ("linear_damping", "load over velocity relative to the water"),
     ):
         yield matrix_parameter(name, f"{text}, for {velocities}", getattr(boat, name))
-    text = "force over squared air velocity"
-    yield from vector_parameters("air_drag", "kg/m", boat.air_drag, text)
-    text = "point at which the air drag acts, from O"
-    yield from vector_parameters("air_centre", "m", boat.air_centre, text)
-    text = "centre of the top of the landing deck, from O"
-    yield from vector_parameters("deck_centre", "m", boat.deck_centre, text)
+    yield from attribute_parameters(boat, _AIR_PARAMETERS)
+
+
+#: attribute, and name, unit, smallest value and description of its parameter
+_MASS_PARAMETERS = (
+    ("centre_of_mass", "centre_of_mass", "m", None, "centre of mass from O"),
+    ("water_density", "water_density", "kg/m3", 0.0, "density of the water"),
+)
+_AIR_PARAMETERS = (
+    ("air_drag", "air_drag", "kg/m", None, "force over squared air velocity"),
+    ("air_centre", "air_centre", "m", None, "point at which the air drag acts, from O"),
+    ("deck_centre", "deck_centre", "m", None, "centre of the top of the landing deck, from O"),
+)
 
 
 _Boat = TypeVar("_Boat", bound=Boat)
@@ -186,8 +191,8 @@ class BoatReader(VehicleReader[_Boat]):
             data.get("propeller", {}), ("propeller",), (), tuple(_PROPELLER_QUANTITIES)
         )
         return [
-            self.read_propeller(common, each, ("propellers", str(i)))
-            for i, each in self.elements(data, "propellers")
+            self.read_propeller(common, each, path)
+            for path, each in self.elements(data, "propellers")
         ]
 
     def read_propeller(self, common: Mapping[str, Any], value: Any, path: JsonPath) -> Propeller:
@@ -215,7 +220,7 @@ class BoatReader(VehicleReader[_Boat]):
     def read_rudders(self, data: Mapping[str, Any]) -> list[Rudder]:
         """Read all rudders; a vessel may have none."""
         given = self.elements(data, "rudders") if data.get("rudders") != [] else []
-        return [self.read_rudder(each, ("rudders", str(i))) for i, each in given]
+        return [self.read_rudder(each, path) for path, each in given]
 
     def read_rudder(self, value: Any, path: JsonPath) -> Rudder:
         """Read one rudder."""

@@ -31,8 +31,9 @@ from ..common.contact_maps import (
     predict_symbols,
     predicted_state,
 )
-from ..common.interface import VESSEL_STATES, WORLD_OUTPUTS
+from ..common.interface import VESSEL_STATES
 from ..common.named_values import ConstantsMap, NamedValues, values_by_name, variables_of
+from ..common.rigid_body import with_world_outputs
 from ..common.shapes import Body
 from ..common.water_surface import SURFACE_SUM, create_elevation_function
 from .hull import Hull
@@ -104,9 +105,7 @@ class VesselModel:
             lambda x, u, c: ca.vertcat(
                 self.hull_with(c).rate(x, values_by_name(u, inputs)), self._actuator_rates(x, u, c)
             ),
-            lambda x, _u, c: ca.vertcat(
-                self.hull_with(c).observe(x), ca.SX.zeros(len(WORLD_OUTPUTS))
-            ),
+            lambda x, _u, c: with_world_outputs(self.hull_with(c).observe(x)),
             normalised_state,
             derived_parameters=self.constants.vector,
             max_sub_step=MAX_STEP,
@@ -135,21 +134,19 @@ class BulletBody(NamedTuple):
     inertia: ca.SX
 
 
-def constant_body(body: Body) -> Callable[[ca.SX], BulletBody]:
-    """Return the function from the constants to a body that does not depend on them."""
-    return lambda _constants: BulletBody(ca.SX(body.mass), ca.SX(body.inertia))
-
-
 def floating_block(
-    model: ContinuousModel, vessel: VesselModel, body: Callable[[ca.SX], BulletBody]
+    model: ContinuousModel, vessel: VesselModel, body: Body | Callable[[ca.SX], BulletBody]
 ) -> Block:
     """Return a vessel for export: its FMU and the contact functions of the world.
 
     Args:
         model: Equations of the vessel as they are exported.
         vessel: The same equations by name.
-        body: Function from the constants to mass and inertia of the body in Bullet.
+        body: Body in Bullet, or the function from the constants to its mass and inertia.
     """
+    if isinstance(body, Body):
+        constant = BulletBody(ca.SX(body.mass), ca.SX(body.inertia))
+        return as_block(model, FloatingContactMaps(model, vessel, lambda _: constant).functions())
     return as_block(model, FloatingContactMaps(model, vessel, body).functions())
 
 
@@ -193,7 +190,11 @@ class FloatingContactMaps:
         impulse = arguments["contact_impulse"]
         hull, attitude = self.vessel.hull_with(constants), kinematics.rotation_matrix(state[3:7])
         load = _impulse_about_centre(hull, attitude, impulse) / step
-        end = predicted_state(self.model, arguments, self._loaded(arguments["inputs"], load))
+        inputs = arguments["inputs"]
+        first = [each.name for each in self.model.elements("input")].index("external_force.x")
+        last = first + TWIST_SIZE
+        loaded = ca.vertcat(inputs[:first], inputs[first:last] + load, inputs[last:])
+        end = predicted_state(self.model, arguments, loaded)
         moved = mean_twist(state, end, step)
         body = self.body(constants)
         inertia = _inertia_in_world(body, attitude)
@@ -234,13 +235,6 @@ class FloatingContactMaps:
         return impulse_correct_function(
             arguments, impulse, magnitude, corrected, mean_nu, hull.observe
         )
-
-    def _loaded(self, inputs: ca.SX, load: ca.SX) -> ca.SX:
-        """Return the inputs with a load (6) added to the external loads."""
-        names = [variable.name for variable in self.model.elements("input")]
-        first = names.index("external_force.x")
-        end = first + TWIST_SIZE
-        return ca.vertcat(inputs[:first], inputs[first:end] + load, inputs[end:])
 
 
 def _inertia_in_world(body: BulletBody, attitude: ca.SX) -> ca.SX:

@@ -118,7 +118,7 @@ def rate_function(model: Any, given: dict[str, Any]) -> Any:
 
 
 def test_planar_vessel_at_random_states() -> None:
-    from plant_src.vehicles.planar_vessel.equations import PlanarEquations
+    from plant_src.vehicles.planar_vessel.equations import planar_vessel_model
 
     quadratic = tuple(10 * RANDOM.uniform(0, 1, (3, 3)) for _ in range(3))
     vessel = PlanarVessel(
@@ -128,9 +128,7 @@ def test_planar_vessel_at_random_states() -> None:
         quadratic_damping=quadratic,
         cubic_damping=(1.0, 2.0, 3.0),
     )
-    rate = rate_function(
-        PlanarEquations(vessel, (MAX_PROPELLERS, MAX_RUDDERS), "boat", "").model, {}
-    )
+    rate = rate_function(planar_vessel_model(vessel, "", (MAX_PROPELLERS, MAX_RUDDERS)), {})
     for _ in range(STATES):
         yaw, nu, speeds, given = (
             RANDOM.uniform(-3, 3),
@@ -151,14 +149,14 @@ def test_floating_vessel_at_random_states(count: int) -> None:
     """Half of the states lie in all attitudes and up to 0.4 m above or below the water, the others
     near the rest.
     """
-    from plant_src.vehicles.surface_vessel.equations import FloatingEquations
+    from plant_src.vehicles.surface_vessel.equations import surface_vessel_model
 
     hull = HullForm(
         count, 1.6, 0.4 / count, 0.3, 0.4, -0.25, -0.04, 0.8, 0.05 * count, 0.1 * count, 1.2, 0.9
     )
     inertia, quadratic = positive_definite(3, 1) + 4 * np.eye(3), RANDOM.uniform(0, 30, (6, 6))
     vessel = SurfaceVessel(**boat(6), inertia=inertia, quadratic_damping=quadratic, hull=hull)
-    equations = FloatingEquations(vessel, (MAX_PROPELLERS, MAX_RUDDERS), "boat", "")
+    equations = surface_vessel_model(vessel, "", (MAX_PROPELLERS, MAX_RUDDERS))
     realisation = sea(SEA)
     components = len(realisation.phase)
     given_waves: dict[str, Any] = {"wave.count": float(components)}
@@ -167,7 +165,7 @@ def test_floating_vessel_at_random_states(count: int) -> None:
             *getattr(realisation, name),
             *[0.0] * (MAX_WAVE_COMPONENTS - components),
         ]
-    rate = rate_function(equations.model.create_continuous_model(), given_waves)
+    rate = rate_function(equations.create_continuous_model(), given_waves)
     points, centre, emerged = (
         reference.strip_points(vessel),
         np.array([hull.waterplane_centre, 0, hull.bottom + vessel.draught]),

@@ -192,9 +192,9 @@ class FixedStepIntegrator(Integrator):
         model.set_states()
 
     def _runge_kutta_step(self, begin: float, end: float) -> None:
-        # The classical method of order 4: slopes k1 at the begin, k2 and k3 in the middle, k4 at the
-        # end of the step; each is evaluated at the start plus a weight times the slope before it.
-        # The step is size / 6 * (k1 + 2 k2 + 2 k3 + k4).
+        # The classical method of order 4: slopes k1 at the begin, k2 and k3 in the middle, k4 at
+        # the end of the step; each is evaluated at the start plus a weight times the slope before
+        # it. The step is size / 6 * (k1 + 2 k2 + 2 k3 + k4).
         model, size = self._model, self._state.substep_size
         model.get_derivatives()
         self._start_states[:], self._sum[:] = model.states, model.derivatives

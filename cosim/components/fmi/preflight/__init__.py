@@ -5,20 +5,18 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from io import BufferedReader
 from itertools import islice, starmap
 from pathlib import Path
 
 from ....core.errors import InputError
 from . import rules_model, rules_variables
-from .archive import NAME_FORM, REPEATED, Archive, open_regular_file
+from .archive import Archive, open_regular_file
 from .binary import check_binary
 from .findings import (
     DESCRIPTION_FILE,
     FatalFindingError,
     Finding,
-    Rule,
     raise_errors,
 )
 from .model_description import Interface, ModelDescription, Violation, to_finding
@@ -26,40 +24,6 @@ from .platforms import current_platform
 from .xml import parse_xml
 from .xml_reader import check_repeated_elements, read_model
 
-__all__ = [
-    "DESCRIPTION_FILE",
-    "RUN_WARNINGS",
-    "Examination",
-    "Finding",
-    "Interface",
-    "examine",
-    "extract",
-    "open_regular_file",
-    "raise_errors",
-]
-
-MISSING = Rule("archive.description", "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5")
-CHANGED = Rule("archive.changed", "limits")
-#: rules whose violations do not prevent a run, but may change its results
-RUN_WARNINGS = frozenset(
-    {
-        *(NAME_FORM, REPEATED, rules_model.OUTPUTS),
-        *(rules_model.EMPTY_TOKEN, rules_model.IDENTIFIER, rules_model.EXPERIMENT_VALUE),
-        *(
-            rules_variables.UNIQUE,
-            rules_variables.UNIT,
-            rules_variables.COMBINATION,
-            rules_variables.CONTINUOUS,
-            rules_variables.INITIAL_RULE,
-        ),
-        *(
-            rules_variables.DECLARED,
-            rules_variables.MISSING,
-            rules_variables.RANGE,
-            rules_variables.LIMIT,
-        ),
-    }
-)
 _MAX_FINDINGS_PER_CHECK = 100
 #: folders that a running FMU does not use
 _UNUSED_FOLDERS = ("documentation", "sources")
@@ -125,7 +89,9 @@ def _examine_archive(archive: Archive, result: Examination) -> None:
         return
     result.members = {name: entry.crc for name, entry in archive.members.items()}
     if DESCRIPTION_FILE not in archive.members:
-        raise FatalFindingError(MISSING(f"there is no member '{DESCRIPTION_FILE}' in the archive"))
+        raise FatalFindingError(
+            "archive.description", f"there is no member '{DESCRIPTION_FILE}' in the archive"
+        )
     root = parse_xml(archive.read(DESCRIPTION_FILE), DESCRIPTION_FILE)
     model = result.model = read_model(root)
     result.findings += check_repeated_elements(root)
@@ -141,7 +107,7 @@ def _examine_archive(archive: Archive, result: Examination) -> None:
 
 
 def _has_errors(findings: Sequence[Finding]) -> bool:
-    return any(finding.rule.severity == "error" for finding in findings)
+    return any(finding.severity == "error" for finding in findings)
 
 
 def extract(path: Path, examination: Examination, folder: Path) -> None:
@@ -157,23 +123,25 @@ def extract(path: Path, examination: Examination, folder: Path) -> None:
     """
     assert examination.model is not None  # otherwise the FMU has errors and is not used
     binary_folder = current_platform().binary_folder(examination.model.major)
+
+    def is_used(name: str) -> bool:
+        """Return False for sources, documentation and binaries of other platforms."""
+        first, _, rest = name.partition("/")
+        return first not in _UNUSED_FOLDERS and (
+            first != "binaries" or rest.partition("/")[0] == binary_folder
+        )
+
     with open_regular_file(path) as file:
         try:
             if _file_identity(file) != examination.file_identity:
-                raise FatalFindingError(CHANGED("the file was changed after it had been examined"))
+                raise FatalFindingError(
+                    "archive.changed", "the file was changed after it had been examined"
+                )
             archive = Archive(file)
             raise_errors(path, archive.findings)
-            archive.extract(folder, partial(_is_used, binary_folder=binary_folder))
+            archive.extract(folder, is_used)
         except FatalFindingError as error:
             raise_errors(path, [error.finding])
-
-
-def _is_used(name: str, binary_folder: str) -> bool:
-    """Return False for sources, documentation and binaries of other platforms."""
-    first, _, rest = name.partition("/")
-    return first not in _UNUSED_FOLDERS and (
-        first != "binaries" or rest.partition("/")[0] == binary_folder
-    )
 
 
 def _file_identity(file: BufferedReader) -> tuple[int, ...]:

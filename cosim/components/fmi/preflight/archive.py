@@ -17,17 +17,8 @@ from pathlib import Path
 
 from ....core.errors import InputError, nearest_file
 from . import zip_format
-from .findings import FatalFindingError, Finding, Rule
+from .findings import FatalFindingError, Finding
 from .zip_format import ZipEntry
-
-_ZIP = "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5"
-NAME = Rule("archive.name", _ZIP)
-NAME_FORM = Rule("archive.name-form", _ZIP, "warning")
-COLLISION = Rule("archive.collision", _ZIP)
-REPEATED = Rule("archive.repeated", _ZIP, "warning")
-KIND = Rule("archive.kind", _ZIP)
-ENCRYPTION = Rule("archive.encryption", _ZIP)
-COMPRESSION = Rule("archive.compression", _ZIP)
 
 #: compression methods
 STORED, DEFLATED = 0, 8
@@ -44,12 +35,6 @@ _FILE_TYPE_NAMES = {
 }
 
 
-def check_member(entry: ZipEntry) -> Iterator[Finding]:
-    """Check name, file type, encryption and compression method of a member."""
-    yield from _check_name(entry)
-    yield from _check_kind(entry)
-
-
 def file_type_name(mode: int) -> str:
     """Return words for the file type in a Unix file mode, for a message "NAME is ..."."""
     letter = stat.filemode(mode)[0]
@@ -58,56 +43,71 @@ def file_type_name(mode: int) -> str:
 
 def _check_name(entry: ZipEntry) -> Iterator[Finding]:
     name = entry.decoded_name
-    if entry.flags & zip_format.UTF8 and not _is_utf8(entry.name):
-        yield NAME("its name is marked as UTF-8 but is not UTF-8", name)
+    if entry.flags & zip_format.UTF8 and entry.raw_name.encode() != entry.name:
+        yield Finding("archive.name", "its name is marked as UTF-8 but is not UTF-8", name)
     if not name.isprintable():
-        yield NAME("its name contains control characters or other non-printable characters", name)
+        yield Finding(
+            "archive.name",
+            "its name contains control characters or other non-printable characters",
+            name,
+        )
     if "\\" in entry.raw_name:
-        yield NAME_FORM('its name contains a backslash, which is read as "/"', name)
+        yield Finding(
+            "archive.name-form", 'its name contains a backslash, which is read as "/"', name
+        )
     if entry.raw_name.startswith("./"):
-        yield NAME_FORM('its name begins with "./", which is ignored', name)
+        yield Finding("archive.name-form", 'its name begins with "./", which is ignored', name)
     if ":" in name:
-        yield NAME("its name contains a colon, expected a relative path", name)
+        yield Finding("archive.name", "its name contains a colon, expected a relative path", name)
     if name.count("/") > _MAX_DEPTH:
-        yield NAME(f"is nested {name.count('/')} folders deep, expected at most {_MAX_DEPTH}", name)
+        yield Finding(
+            "archive.name",
+            f"is nested {name.count('/')} folders deep, expected at most {_MAX_DEPTH}",
+            name,
+        )
         return
     parts = name.removesuffix("/").split("/")
     if name != "./" and not {"", ".", ".."}.isdisjoint(parts):
-        yield NAME('its name contains an empty, "." or ".." part, expected a relative path', name)
+        yield Finding(
+            "archive.name",
+            'its name contains an empty, "." or ".." part, expected a relative path',
+            name,
+        )
     if len(entry.name) > _MAX_PATH_LENGTH or any(
         len(os.fsencode(part)) > _MAX_NAME_LENGTH for part in parts
     ):
-        yield NAME(
-            f"its name is longer than {_MAX_NAME_LENGTH} bytes (a path: {_MAX_PATH_LENGTH})", name
+        yield Finding(
+            "archive.name",
+            f"its name is longer than {_MAX_NAME_LENGTH} bytes (a path: {_MAX_PATH_LENGTH})",
+            name,
         )
 
 
-def _is_utf8(name: bytes) -> bool:
-    try:
-        name.decode()
-    except UnicodeDecodeError:
-        return False
-    return True
-
-
 def _check_kind(entry: ZipEntry) -> Iterator[Finding]:
+    """Check file type, encryption and compression method of a member."""
     name, is_folder = entry.decoded_name, entry.decoded_name.endswith("/")
     # some tools give folders the mode of a file, so only the name decides which members become
     # folders
     if stat.S_IFMT(entry.mode) not in (0, stat.S_IFREG, stat.S_IFDIR if is_folder else 0):
         if stat.S_ISDIR(entry.mode):
-            yield KIND('has the mode of a folder, expected a name that ends with "/"', name)
+            yield Finding(
+                "archive.kind", 'has the mode of a folder, expected a name that ends with "/"', name
+            )
         else:
-            yield KIND(
-                f"is {file_type_name(entry.mode)}, expected a regular file or a folder", name
+            yield Finding(
+                "archive.kind",
+                f"is {file_type_name(entry.mode)}, expected a regular file or a folder",
+                name,
             )
     if is_folder and entry.size:
-        yield KIND(f"is a folder with {entry.size} bytes of data", name)
+        yield Finding("archive.kind", f"is a folder with {entry.size} bytes of data", name)
     if entry.flags & zip_format.ENCRYPTED:
-        yield ENCRYPTION("is encrypted", name)
+        yield Finding("archive.encryption", "is encrypted", name)
     if entry.method not in (STORED, DEFLATED):
-        yield COMPRESSION(
-            f"is compressed by method {entry.method}, expected 0 (stored) or 8 (deflated)", name
+        yield Finding(
+            "archive.compression",
+            f"is compressed by method {entry.method}, expected 0 (stored) or 8 (deflated)",
+            name,
         )
 
 
@@ -126,8 +126,13 @@ def check_collisions(members: Sequence[tuple[str, object]]) -> Iterator[Finding]
         folded = _fold_case(name)
         if folded in first_names:
             first = first_names[folded]
-            rule = REPEATED if first == name and content == contents[name] else COLLISION
-            yield rule(
+            rule = (
+                "archive.repeated"
+                if first == name and content == contents[name]
+                else "archive.collision"
+            )
+            yield Finding(
+                rule,
                 "occurs twice"
                 if first == name
                 else f'differs only in case or Unicode form from "{first}"',
@@ -138,7 +143,7 @@ def check_collisions(members: Sequence[tuple[str, object]]) -> Iterator[Finding]
     files = {folded for folded, name in first_names.items() if not name.endswith("/")}
     for folded, name in first_names.items():
         if parent := next((folder for folder in _parent_folders(folded) if folder in files), None):
-            yield COLLISION(f'is inside "{parent}", which is a file', name)
+            yield Finding("archive.collision", f'is inside "{parent}", which is a file', name)
 
 
 def _parent_folders(name: str) -> Iterator[str]:
@@ -155,12 +160,6 @@ def _fold_case(name: str) -> str:
         "NFC", unicodedata.normalize("NFC", name.removesuffix("/")).casefold()
     )
 
-
-FILE = Rule("archive.file", _ZIP)
-SIZE = Rule("archive.size", "limits")
-OVERLAP = Rule("archive.overlap", "CVE-2024-0450")
-GAP = Rule("archive.gap", _ZIP, "warning")
-DATA = Rule("archive.data", "APPNOTE 4.3.8")
 
 #: largest size of the data descriptor behind a member's data (APPNOTE 4.3.9, bytes)
 _MAX_DATA_DESCRIPTOR_SIZE = 24
@@ -198,34 +197,37 @@ class Archive:
 
     def _check_entries(self) -> Iterator[Finding]:
         for entry in self._entries:
-            yield from check_member(entry)
+            yield from _check_name(entry)
+            yield from _check_kind(entry)
             yield from self._check_size(entry)
         yield from check_collisions(
             [(entry.decoded_name, (entry.crc, entry.size)) for entry in self._entries]
         )
         total = sum(entry.size for entry in self._entries)
         if total > MAX_EXPANDED_SIZE:
-            yield SIZE(f"expands to {total} bytes, expected at most {MAX_EXPANDED_SIZE}")
+            yield Finding(
+                "archive.size", f"expands to {total} bytes, expected at most {MAX_EXPANDED_SIZE}"
+            )
         yield from self._check_offsets()
 
     def _check_size(self, entry: ZipEntry) -> Iterator[Finding]:
         if entry.method == STORED and entry.size != entry.compressed_size:
             text = f"is stored in {entry.compressed_size} bytes but has a size of {entry.size}"
-            yield SIZE(text, entry.decoded_name)
+            yield Finding("archive.size", text, entry.decoded_name)
         elif entry.size > max(RATIO_THRESHOLD, MAX_RATIO * entry.compressed_size):
             text = (
                 f"{entry.compressed_size} bytes expand to {entry.size}, expected at most "
                 f"{MAX_RATIO} times as many"
             )
-            yield SIZE(text, entry.decoded_name)
+            yield Finding("archive.size", text, entry.decoded_name)
 
     def _check_offsets(self) -> Iterator[Finding]:
         """Check that members follow one another without overlaps and gaps.
 
         They reach from the start of the file to the central directory.
         """
-        # Members that share bytes make small archives expand without limit, and bytes that belong to
-        # no member can hide one that other programs read.
+        # Members that share bytes make small archives expand without limit, and bytes that belong
+        # to no member can hide one that other programs read.
         end = 0
         for entry in sorted(self._entries, key=lambda entry: entry.offset):
             try:
@@ -237,19 +239,23 @@ class Archive:
                 continue
             data_end = begin + entry.compressed_size
             if entry.offset < end or data_end > self._directory_offset:
-                yield OVERLAP(
+                yield Finding(
+                    "archive.overlap",
                     f"shares its bytes {entry.offset} to {data_end} with another member",
                     entry.decoded_name,
                 )
             elif entry.offset - end > _MAX_DATA_DESCRIPTOR_SIZE:
-                yield GAP(
-                    f"{entry.offset - end} bytes before it belong to no member", entry.decoded_name
+                yield Finding(
+                    "archive.gap",
+                    f"{entry.offset - end} bytes before it belong to no member",
+                    entry.decoded_name,
                 )
             end = max(end, data_end)
         if self._directory_offset - end > _MAX_DATA_DESCRIPTOR_SIZE:
-            yield GAP(
+            yield Finding(
+                "archive.gap",
                 f"{self._directory_offset - end} bytes before the central directory belong to no "
-                "member"
+                "member",
             )
 
     def read(self, name: str) -> bytes:
@@ -302,11 +308,11 @@ class Archive:
         if size != entry.size:
             found = "more" if size > entry.size else size
             raise FatalFindingError(
-                DATA(f"found {found} bytes, expected {entry.size}", entry.decoded_name)
+                "archive.data", f"found {found} bytes, expected {entry.size}", entry.decoded_name
             )
         if crc != entry.crc:
             raise FatalFindingError(
-                DATA(f"found CRC {crc:08x}, expected {entry.crc:08x}", entry.decoded_name)
+                "archive.data", f"found CRC {crc:08x}, expected {entry.crc:08x}", entry.decoded_name
             )
 
     def _read_stored(self, entry: ZipEntry) -> Iterator[bytes]:
@@ -326,11 +332,11 @@ class Archive:
             yield decompressor.flush()
         except zlib.error as error:
             raise FatalFindingError(
-                DATA(f"the compressed data are damaged: {error}", entry.decoded_name)
+                "archive.data", f"the compressed data are damaged: {error}", entry.decoded_name
             ) from None
         if not decompressor.eof or decompressor.unused_data:
             raise FatalFindingError(
-                DATA("the compressed data end too early or too late", entry.decoded_name)
+                "archive.data", "the compressed data end too early or too late", entry.decoded_name
             )
 
 

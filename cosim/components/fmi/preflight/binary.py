@@ -9,23 +9,10 @@ from pathlib import Path
 from ....core.errors import abbreviate_names
 from . import elf, macho, pe
 from .archive import Archive
-from .findings import Finding, Rule, escape_unprintable
+from .findings import Finding, escape_unprintable
 from .functions import called_functions, standard_functions
 from .model_description import Interface, ModelDescription
 from .platforms import EXPECTED_TEXTS, FmuPlatform, InvalidLibraryError, SharedLibrary
-
-_BINARIES = "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5.1"
-_FUNCTIONS = "FMI 2.0.5 sections 2.1 and 4.2, FMI 3.0.2 section 2.5"
-PLATFORM = Rule("binary.platform", _BINARIES)
-SOURCES_ONLY = Rule("binary.sources-only", _BINARIES, "warning")
-WINDOWS_ONLY = Rule("binary.windows-only", _BINARIES, "warning")
-PRESENT = Rule("binary.present", _BINARIES)
-FORMAT = Rule("binary.format", _BINARIES)
-FUNCTIONS = Rule("binary.functions", _FUNCTIONS)
-UNUSED_FUNCTIONS = Rule("binary.unused-functions", _FUNCTIONS, "warning")
-SIZE = Rule("binary.size", "limits")
-NEEDED = Rule("binary.needed", _BINARIES, "warning")
-VERSION = Rule("binary.version", "FMI 2.0.5 section 2.1.4, FMI 3.0.2 section 2.2.4", "warning")
 
 #: largest size of the library for this platform (bytes), which is read into memory
 MAX_LIBRARY_SIZE = 1 << 28
@@ -37,7 +24,6 @@ _READERS: Mapping[str, Callable[[bytes, str], SharedLibrary]] = {
     ".dll": pe.read_library,
     ".dylib": macho.read_library,
 }
-_LIBRARY_SUFFIXES = (".so", ".dll", ".dylib")
 
 
 def list_platforms(names: Iterable[str]) -> list[str]:
@@ -53,7 +39,7 @@ def list_platforms(names: Iterable[str]) -> list[str]:
     folders = {
         part[1]
         for part in parts
-        if len(part) == 3 and part[0] == "binaries" and part[2].endswith(_LIBRARY_SUFFIXES)
+        if len(part) == 3 and part[0] == "binaries" and part[2].endswith(tuple(_READERS))
     }
     sources = any(
         part[0] == "sources" and part[-1].endswith((".c", ".cpp"))
@@ -89,16 +75,18 @@ def check_binary(
             folder if folder == machine.platform_tuple else f"{machine.platform_tuple} ({folder})"
         )
         if "c-code" in platforms:
-            yield SOURCES_ONLY(
-                f"has no binary for {names}; its sources are compiled when it is used"
+            yield Finding(
+                "binary.sources-only",
+                f"has no binary for {names}; its sources are compiled when it is used",
             )
             return
         if (
             machine.platform_tuple == "x86_64-linux"
             and WINDOWS.binary_folder(model.major) in platforms
         ):
-            yield WINDOWS_ONLY(
-                f"has no binary for {names}; its library for Windows runs under Wine"
+            yield Finding(
+                "binary.windows-only",
+                f"has no binary for {names}; its library for Windows runs under Wine",
             )
             return
         bits = (
@@ -106,8 +94,9 @@ def check_binary(
             if {"win32", "x86-windows"} & set(platforms)
             else ""
         )
-        yield PLATFORM(
-            f"has no binary for {names}; it has: {', '.join(platforms) or 'no binaries'}{bits}"
+        yield Finding(
+            "binary.platform",
+            f"has no binary for {names}; it has: {', '.join(platforms) or 'no binaries'}{bits}",
         )
         return
     identifier = model.interfaces[interface].get("modelIdentifier", "")
@@ -116,9 +105,13 @@ def check_binary(
         found = ", ".join(
             name for name in archive.members if name.startswith(f"binaries/{folder}/")
         )
-        yield PRESENT(f"the library cannot be loaded: {member} does not exist; found: {found}")
+        yield Finding(
+            "binary.present",
+            f"the library cannot be loaded: {member} does not exist; found: {found}",
+        )
     elif archive.members[member].size > MAX_LIBRARY_SIZE:
-        yield SIZE(
+        yield Finding(
+            "binary.size",
             (
                 f"the library has {archive.members[member].size} bytes, expected at most "
                 f"{MAX_LIBRARY_SIZE}"
@@ -139,23 +132,33 @@ def _check_library(
     try:
         library = _READERS[machine.suffix](archive.read(member), machine.architecture)
     except InvalidLibraryError as error:
-        yield FORMAT(f"the library cannot be loaded: it {error}", member)
+        yield Finding("binary.format", f"the library cannot be loaded: it {error}", member)
         return
     called = called_functions(model, interface)
     identifier = model.interfaces[interface]["modelIdentifier"]
     if missing := sorted(called - library.exports):
-        yield FUNCTIONS(f"the library does not export {abbreviate_names(missing, limit=5)}", member)
+        yield Finding(
+            "binary.functions",
+            f"the library does not export {abbreviate_names(missing, limit=5)}",
+            member,
+        )
     if unused := sorted(
         standard_functions(model.major, interface, identifier) - called - library.exports
     ):
-        yield UNUSED_FUNCTIONS(
-            f"the library does not export {abbreviate_names(unused, limit=5)}", member
+        yield Finding(
+            "binary.unused-functions",
+            f"the library does not export {abbreviate_names(unused, limit=5)}",
+            member,
         )
     for text in version_deviations(library.constant_texts):
-        yield VERSION(text, member)
+        yield Finding("binary.version", text, member)
     for name in library.needed_libraries:
         if not _is_library_found(name, library, archive, member):
-            yield NEEDED(f"needs the library {name}, which was not found on this machine", member)
+            yield Finding(
+                "binary.needed",
+                f"needs the library {name}, which was not found on this machine",
+                member,
+            )
 
 
 def version_deviations(texts: Mapping[str, bytes | None]) -> Iterator[str]:
@@ -188,15 +191,9 @@ def _is_library_found(name: str, library: SharedLibrary, archive: Archive, membe
         return True
     folders = [folder for folder in library.search_folders if folder.startswith("/")]
     folders += [folder for folder in os.environ.get("LD_LIBRARY_PATH", "").split(":") if folder]
-    return any((Path(folder) / name).is_file() for folder in folders) or _is_in_loader_cache(name)
-
-
-def _is_in_loader_cache(name: str) -> bool:
-    """Return whether the loader's cache contains a library.
-
-    True on systems without such a cache.
-    """
+    if any((Path(folder) / name).is_file() for folder in folders):
+        return True
     try:
         return name.encode() + b"\0" in Path("/etc/ld.so.cache").read_bytes()
-    except OSError:
+    except OSError:  # a system without such a cache
         return True

@@ -100,9 +100,6 @@ class _ElfReader:
         self.content, self.bits, self.byte_order = content, bits, byte_order
         self.word_format = "Q" if bits == 64 else "L"
         self.program_headers = list(self._program_headers())
-        self.load_segments = [
-            header for header in self.program_headers if header.p_type == _PT_LOAD
-        ]
 
     def unpack(self, form: str, offset: int) -> tuple[int, ...]:
         """Unpack numbers at an offset in the file, in the format of `struct` without byte order."""
@@ -115,18 +112,14 @@ class _ElfReader:
         if e_phnum == 0 or e_phentsize < (56 if is_64_bit else 32):
             raise InvalidLibraryError("has no segments to load")
         for i in range(e_phnum):
-            header = self._program_header(e_phoff + i * e_phentsize)
-            end = header.p_offset + header.p_filesz
-            if header.p_type in (_PT_LOAD, _PT_DYNAMIC):
-                check_end(self.content, end, "a segment")
-            yield header
-
-    def _program_header(self, offset: int) -> _ProgramHeader:
-        if self.bits == 64:
-            p_type, _, p_offset, p_vaddr, _, p_filesz = self.unpack("2L4Q", offset)
-        else:
-            p_type, p_offset, p_vaddr, _, p_filesz = self.unpack("5L", offset)
-        return _ProgramHeader(p_type, p_offset, p_vaddr, p_filesz)
+            offset = e_phoff + i * e_phentsize
+            if is_64_bit:
+                p_type, _, p_offset, p_vaddr, _, p_filesz = self.unpack("2L4Q", offset)
+            else:
+                p_type, p_offset, p_vaddr, _, p_filesz = self.unpack("5L", offset)
+            if p_type in (_PT_LOAD, _PT_DYNAMIC):
+                check_end(self.content, p_offset + p_filesz, "a segment")
+            yield _ProgramHeader(p_type, p_offset, p_vaddr, p_filesz)
 
     def library(self) -> SharedLibrary:
         """Read the dynamic section and the tables it refers to."""
@@ -166,8 +159,8 @@ class _ElfReader:
 
     def _file_offset(self, address: int) -> int:
         """Return the offset in the file of the byte that is loaded to an address."""
-        for _, p_offset, p_vaddr, p_filesz in self.load_segments:
-            if p_vaddr <= address < p_vaddr + p_filesz:
+        for p_type, p_offset, p_vaddr, p_filesz in self.program_headers:
+            if p_type == _PT_LOAD and p_vaddr <= address < p_vaddr + p_filesz:
                 return p_offset + address - p_vaddr
         raise InvalidLibraryError(f"is damaged: address {address:#x} is in no segment")
 
@@ -221,9 +214,9 @@ class _ElfReader:
 
     def _gnu_symbol_count(self, offset: int) -> int:
         """Return one more than the largest symbol index in the chains of a GNU hash table."""
-        # The table has no number of symbols. Each bucket holds the first symbol of a chain, and the
-        # chain ends with a hash whose lowest bit is set: the end of the chain with the largest first
-        # symbol is the last symbol.
+        # The table has no number of symbols. Each bucket holds the first symbol of a chain, and
+        # the chain ends with a hash whose lowest bit is set: the end of the chain with the largest
+        # first symbol is the last symbol.
         nbuckets, symoffset, bloom_size, _ = self.unpack("4L", offset)
         if nbuckets > _MAX_SYMBOLS or bloom_size > _MAX_SYMBOLS:
             raise InvalidLibraryError(f"is damaged: it claims {nbuckets} hash buckets")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 from ....core.component import DTYPES
 from .model_description import Interface, ModelDescription, is_true
@@ -130,16 +130,13 @@ def called_functions(model: ModelDescription, interface: Interface) -> frozenset
         interface: Interface through which it is simulated.
     """
     attributes = model.interfaces[interface]
-    names = {*_CALLED[model.major, interface].split(), *_accessors_of_variables(model)}
+    names = set(_CALLED[model.major, interface].split())
+    for kind, causality in {(variable.kind, variable.causality) for variable in model.variables}:
+        accessor = ACCESSORS[model.major][kind]
+        names.add(f"Get{accessor}")
+        if causality in ("input", "parameter", "structuralParameter"):
+            names.add(f"Set{accessor}")
     if is_true(attributes, "canGetAndSetFMUstate", "canGetAndSetFMUState"):
         names.update(_STATE[model.major].split())
     prefix = function_prefix(model.major, attributes["modelIdentifier"])
     return frozenset(prefix + name for name in names)
-
-
-def _accessors_of_variables(model: ModelDescription) -> Iterator[str]:
-    for kind, causality in {(variable.kind, variable.causality) for variable in model.variables}:
-        accessor = ACCESSORS[model.major][kind]
-        yield f"Get{accessor}"
-        if causality in ("input", "parameter", "structuralParameter"):
-            yield f"Set{accessor}"

@@ -87,7 +87,8 @@ def _exports(content: bytes, ncmds: int, end: int) -> Iterator[str]:
         if cmdsize < 8 or offset + cmdsize > end:
             raise InvalidLibraryError("has damaged load commands")
         if cmd == _LC_SEGMENT_64:
-            _check_segment(content, offset)
+            fileoff, filesize = unpack(content, "<2Q", offset + 40)
+            check_end(content, fileoff + filesize, "a segment")
         elif cmd == _LC_SYMTAB:
             yield from _symbol_table_exports(content, *unpack(content, "<4L", offset + 8))
         elif cmd in _EXPORT_TRIE_COMMANDS:
@@ -139,11 +140,6 @@ def _read_uleb128(trie: bytes, position: int) -> tuple[int, int]:
         if byte < 0x80:
             return value, position
     raise InvalidLibraryError("is damaged: a number in its export trie is not terminated")
-
-
-def _check_segment(content: bytes, command: int) -> None:
-    fileoff, filesize = unpack(content, "<2Q", command + 40)
-    check_end(content, fileoff + filesize, "a segment")
 
 
 def _symbol_table_exports(

@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from ....core.component import DTYPES
-from .findings import DESCRIPTION_FILE, Finding, Rule
+from .findings import DESCRIPTION_FILE, Finding
 
 _FLOAT = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?INF|NaN")
 _INTEGER = re.compile(r"[+-]?[0-9]{1,20}")
@@ -86,8 +86,7 @@ ALLOWED_INITIAL: Mapping[tuple[str, str], Sequence[str]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class TypeDefinition:
+class TypeDefinition(NamedTuple):
     """Declared type.
 
     Attributes:
@@ -105,8 +104,7 @@ class TypeDefinition:
     line: int
 
 
-@dataclass(frozen=True, slots=True)
-class ModelVariable:
+class ModelVariable(NamedTuple):
     """Model variable.
 
     Attributes:
@@ -154,18 +152,17 @@ class ModelVariable:
 
 
 #: violated rule, variable or line in the file, and what was found and expected
-Violation = tuple[Rule, ModelVariable | int, str]
+Violation = tuple[str, ModelVariable | int, str]
 
 
-def to_finding(rule: Rule, place: ModelVariable | int, message: str) -> Finding:
+def to_finding(rule: str, place: ModelVariable | int, message: str) -> Finding:
     """Return the finding for a violation."""
     if isinstance(place, int):
-        return rule(message, DESCRIPTION_FILE, place)
-    return rule(f"{place}: {message}", DESCRIPTION_FILE, place.line)
+        return Finding(rule, message, DESCRIPTION_FILE, place)
+    return Finding(rule, f"{place}: {message}", DESCRIPTION_FILE, place.line)
 
 
-@dataclass(frozen=True, slots=True)
-class Unknown:
+class Unknown(NamedTuple):
     """Element of the model structure.
 
     Attributes:
@@ -183,8 +180,7 @@ class Unknown:
     line: int
 
 
-@dataclass(frozen=True, slots=True)
-class UnitDefinition:
+class UnitDefinition(NamedTuple):
     """Unit definition.
 
     Attributes:

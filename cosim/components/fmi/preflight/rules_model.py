@@ -12,40 +12,15 @@ from collections.abc import Iterable, Iterator
 
 from ....core.size_limits import MAX_SCALARS
 from ....core.units import BASE_UNITS
-from .findings import Rule
 from .model_description import (
     ModelDescription,
     ModelVariable,
     TypeDefinition,
-    UnitDefinition,
     Unknown,
     Violation,
     parse_float,
     parse_value,
 )
-
-_ROOT = "FMI 2.0.5 section 2.2.1, FMI 3.0.2 section 2.4.1"
-_INTERFACE = "FMI 2.0.5 section 4.3.1, FMI 3.0.2 sections 2.4.2 and 4.4"
-_UNITS = "FMI 2.0.5 section 2.2.2, FMI 3.0.2 section 2.4.3"
-_TYPES = "FMI 2.0.5 section 2.2.3, FMI 3.0.2 section 2.4.4"
-_CATEGORIES = "FMI 2.0.5 section 2.2.4, FMI 3.0.2 section 2.4.5"
-_EXPERIMENT = "FMI 2.0.5 section 2.2.5, FMI 3.0.2 section 2.4.6"
-
-NAME = Rule("model.name", _ROOT, "warning")
-TOKEN = Rule("model.token", _ROOT)
-EMPTY_TOKEN = Rule("model.empty-token", _ROOT, "warning")
-INTERFACE = Rule("model.interface", _INTERFACE)
-LIBRARY_NAME = Rule("model.library-name", _INTERFACE)
-IDENTIFIER = Rule("model.identifier", _INTERFACE, "warning")
-COUNT = Rule("model.count", "FMI 1.0 ME section 3.1, FMI 2.0.5 section 2.2.1")
-UNIT_NAME = Rule("unit.unique", _UNITS)
-UNIT_BASE = Rule("unit.base", _UNITS)
-TYPE_NAME = Rule("type.unique", _TYPES)
-TYPE_KIND = Rule("type.kind", _TYPES, "warning")
-ITEMS = Rule("type.items", _TYPES)
-EXPERIMENT_VALUE = Rule("experiment.value", _EXPERIMENT, "warning")
-EXPERIMENT = Rule("experiment.order", _EXPERIMENT, "warning")
-CATEGORIES = Rule("categories.unique", _CATEGORIES, "warning")
 
 _C_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -56,37 +31,41 @@ def check_names(model: ModelDescription) -> Iterator[Violation]:
     attribute = "instantiationToken" if model.major == 3 else "guid"
     token = model.root.get(attribute)
     if token is None:
-        yield TOKEN, line, f"lacks the attribute {attribute}"
+        yield "model.token", line, f"lacks the attribute {attribute}"
     elif not token:
-        yield EMPTY_TOKEN, line, f"the attribute {attribute} is empty"
+        yield "model.empty-token", line, f"the attribute {attribute} is empty"
     if not model.root.get("modelName"):
-        yield NAME, line, "lacks the attribute modelName"
+        yield "model.name", line, "lacks the attribute modelName"
     if not model.interfaces:
-        yield INTERFACE, line, "offers neither Co-Simulation nor Model Exchange"
+        yield "model.interface", line, "offers neither Co-Simulation nor Model Exchange"
     for name, attributes in model.interfaces.items():
         element = "CoSimulation" if name == "co-simulation" else "ModelExchange"
         line = model.lines["" if model.major == 1 else element]
         identifier = attributes.get("modelIdentifier", "")
         if not identifier or not {"/", "\\"}.isdisjoint(identifier):
-            yield LIBRARY_NAME, line, f'found modelIdentifier "{identifier}", expected a file name'
+            yield (
+                "model.library-name",
+                line,
+                f'found modelIdentifier "{identifier}", expected a file name',
+            )
         elif not _C_IDENTIFIER.fullmatch(identifier):
-            yield IDENTIFIER, line, f'found modelIdentifier "{identifier}", expected a C identifier'
+            yield (
+                "model.identifier",
+                line,
+                f'found modelIdentifier "{identifier}", expected a C identifier',
+            )
 
 
 def check_units(model: ModelDescription) -> Iterator[Violation]:
     """Check that unit names are unique, and the numbers of base units are valid."""
     for name, line in _find_duplicates((unit.name, unit.line) for unit in model.units):
-        yield UNIT_NAME, line, f'the unit "{name}" is defined twice'
+        yield "unit.unique", line, f'the unit "{name}" is defined twice'
     for unit in model.units:
-        yield from _check_unit_base(unit)
-
-
-def _check_unit_base(unit: UnitDefinition) -> Iterator[Violation]:
-    for name, text in (unit.base_unit or {}).items():
-        if not _is_valid_base_unit_value(name, text):
-            expected = "an integer" if name in BASE_UNITS else "a finite number, a factor not 0"
-            text = f'unit "{unit.name}": found {name}="{text}", expected {expected}'
-            yield UNIT_BASE, unit.line, text
+        for name, text in (unit.base_unit or {}).items():
+            if not _is_valid_base_unit_value(name, text):
+                expected = "an integer" if name in BASE_UNITS else "a finite number, a factor not 0"
+                text = f'unit "{unit.name}": found {name}="{text}", expected {expected}'
+                yield "unit.base", unit.line, text
 
 
 def _is_valid_base_unit_value(name: str, text: str) -> bool:
@@ -105,15 +84,15 @@ def check_types(model: ModelDescription) -> Iterator[Violation]:
     for name, line in _find_duplicates(
         (definition.name, definition.line) for definition in model.types
     ):
-        yield TYPE_NAME, line, f'the type "{name}" is defined twice'
+        yield "type.unique", line, f'the type "{name}" is defined twice'
     for definition in model.types:
         if not definition.kind:
             text = f'the type "{definition.name}" is not of a type defined by FMI'
-            yield TYPE_KIND, definition.line, text
+            yield "type.kind", definition.line, text
         for message in _item_violations(definition):
-            yield ITEMS, definition.line, message
+            yield "type.items", definition.line, message
         if definition.kind == "Enumeration" and not definition.items:
-            yield TYPE_KIND, definition.line, f'the enumeration "{definition.name}" has no items'
+            yield "type.kind", definition.line, f'the enumeration "{definition.name}" has no items'
 
 
 def _item_violations(definition: TypeDefinition) -> Iterator[str]:
@@ -141,7 +120,7 @@ def check_counts(model: ModelDescription) -> Iterator[Violation]:
             text.isascii() and text.isdecimal() and len(text) < 10 and int(text) <= MAX_SCALARS
         ):
             found = f'found {name}="{text}", expected an integer from 0 to {MAX_SCALARS}'
-            yield COUNT, model.lines[""], found
+            yield "model.count", model.lines[""], found
 
 
 def check_experiment(model: ModelDescription) -> Iterator[Violation]:
@@ -156,20 +135,24 @@ def check_experiment(model: ModelDescription) -> Iterator[Violation]:
         except ValueError:
             numbers[name] = math.nan
         if not math.isfinite(numbers[name]):
-            yield EXPERIMENT_VALUE, line, f'found {name}="{text}", expected a finite number'
+            yield "experiment.value", line, f'found {name}="{text}", expected a finite number'
     start, stop = numbers.get("startTime", 0.0), numbers.get("stopTime", math.inf)
     if stop <= start:
         text = f"found stopTime {stop:g}, expected more than the startTime {start:g}"
-        yield EXPERIMENT, line, text
+        yield "experiment.order", line, text
     for name in ("stepSize", "tolerance"):
         if numbers.get(name, 1.0) <= 0:
-            yield EXPERIMENT, line, f"found {name} {numbers[name]:g}, expected more than 0"
+            yield "experiment.order", line, f"found {name} {numbers[name]:g}, expected more than 0"
 
 
 def check_categories(model: ModelDescription) -> Iterator[Violation]:
     """Check that log categories are unique."""
     for name, _ in _find_duplicates((name, 0) for name in model.log_categories):
-        yield CATEGORIES, model.lines["LogCategories"], f'the log category "{name}" occurs twice'
+        yield (
+            "categories.unique",
+            model.lines["LogCategories"],
+            f'the log category "{name}" occurs twice',
+        )
 
 
 def _find_duplicates(names: Iterable[tuple[str, int]]) -> Iterator[tuple[str, int]]:
@@ -184,14 +167,6 @@ def _find_duplicates(names: Iterable[tuple[str, int]]) -> Iterator[tuple[str, in
 CHECKS = (check_names, check_units, check_types, check_counts, check_experiment, check_categories)
 
 
-_STRUCTURE = "FMI 2.0.5 section 2.2.8, FMI 3.0.2 section 2.4.8"
-UNRESOLVED = Rule("structure.reference", _STRUCTURE)
-DEPENDENCY_KINDS = Rule("structure.dependencies", _STRUCTURE, "warning")
-DUPLICATE = Rule("structure.unique", _STRUCTURE, "warning")
-OUTPUTS = Rule("structure.outputs", _STRUCTURE, "warning")
-DERIVATIVES = Rule("structure.derivatives", _STRUCTURE, "warning")
-UNKNOWNS = Rule("structure.initial-unknowns", _STRUCTURE, "warning")
-
 _VALID_KINDS = ("dependent", "constant", "fixed", "tunable", "discrete")
 
 
@@ -205,9 +180,13 @@ def check_references(model: ModelDescription) -> Iterator[Violation]:
         for reference in (unknown.reference.strip(), *(unknown.dependencies or ())):
             if reference not in model.by_reference:
                 text = f'{unknown.element} refers to variable "{reference}", which does not exist'
-                yield UNRESOLVED, unknown.line, text
+                yield "structure.reference", unknown.line, text
         if (unknown.element, unknown.reference) in seen:
-            yield DUPLICATE, unknown.line, f'{unknown.element} "{unknown.reference}" occurs twice'
+            yield (
+                "structure.unique",
+                unknown.line,
+                f'{unknown.element} "{unknown.reference}" occurs twice',
+            )
         seen.add((unknown.element, unknown.reference))
         yield from _check_dependency_kinds(unknown)
 
@@ -221,29 +200,31 @@ def _check_dependency_kinds(unknown: Unknown) -> Iterator[Violation]:
             f"{unknown.element} has {len(unknown.dependency_kinds)} dependenciesKind for {count} "
             "dependencies"
         )
-        yield DEPENDENCY_KINDS, unknown.line, text
+        yield "structure.dependencies", unknown.line, text
     for kind in unknown.dependency_kinds:
         if kind not in _VALID_KINDS:
             text = f'found "{kind}", expected one of {", ".join(_VALID_KINDS)}'
-            yield DEPENDENCY_KINDS, unknown.line, text
+            yield "structure.dependencies", unknown.line, text
 
 
 def check_completeness(model: ModelDescription) -> Iterator[Violation]:
     """Check that each list of the model structure contains exactly the required variables."""
     if model.major == 1:
         return  # it has no model structure
-    lists = {
-        element: _variables_in(model, element)
-        for element in ("Output", "ContinuousStateDerivative", "InitialUnknown")
-    }
+    derivatives = _variables_in(model, "ContinuousStateDerivative")
     outputs = [variable for variable in model.variables if variable.causality == "output"]
-    yield from _check_list(OUTPUTS, "output", lists["Output"], outputs)
-    for variable in lists["ContinuousStateDerivative"]:
+    yield from _check_list("structure.outputs", "output", _variables_in(model, "Output"), outputs)
+    for variable in derivatives:
         if "derivative" not in variable.attributes:
             text = f"{variable}: is listed as derivative but has no attribute derivative"
-            yield DERIVATIVES, variable.line, text
-    unknowns = _initial_unknowns(model, lists["ContinuousStateDerivative"])
-    yield from _check_list(UNKNOWNS, "initial unknown", lists["InitialUnknown"], unknowns)
+            yield "structure.derivatives", variable.line, text
+    unknowns = _initial_unknowns(model, derivatives)
+    yield from _check_list(
+        "structure.initial-unknowns",
+        "initial unknown",
+        _variables_in(model, "InitialUnknown"),
+        unknowns,
+    )
 
 
 def _variables_in(model: ModelDescription, element: str) -> list[ModelVariable]:
@@ -288,7 +269,7 @@ def _is_computed(variable: ModelVariable) -> bool:
 
 
 def _check_list(
-    rule: Rule, role: str, listed: list[ModelVariable], expected: list[ModelVariable]
+    rule: str, role: str, listed: list[ModelVariable], expected: list[ModelVariable]
 ) -> Iterator[Violation]:
     listed_lines = {v.name: v.line for v in listed}
     expected_lines = {v.name: v.line for v in expected}

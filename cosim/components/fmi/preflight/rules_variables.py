@@ -14,7 +14,6 @@ from itertools import islice
 
 from ....core.errors import did_you_mean
 from ....core.size_limits import MAX_SCALARS
-from .findings import Rule
 from .model_description import (
     ALLOWED_INITIAL,
     ModelDescription,
@@ -24,46 +23,12 @@ from .model_description import (
     parse_value,
 )
 
-_VARIABLES = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7"
-_ATTRIBUTES = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.4"
-_TYPE_SPECIFIC = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.5"
-_UNITS = "FMI 2.0.5 section 2.2.2, FMI 3.0.2 section 2.4.3"
-
-NAME = Rule("variable.name", _VARIABLES)
-UNIQUE = Rule("variable.unique", _VARIABLES, "warning")
-CONVENTION = Rule(
-    "variable.convention", "FMI 2.0.5 section 2.2.9, FMI 3.0.2 section 2.4.7.5.1", "warning"
-)
-KIND = Rule("variable.type", _VARIABLES)
-ATTRIBUTE_VALUE = Rule("variable.word", _ATTRIBUTES)
-COMBINATION = Rule("variable.combination", _ATTRIBUTES, "warning")
-CONTINUOUS = Rule("variable.continuous", _ATTRIBUTES, "warning")
-IMPLIED = Rule("variable.implied-continuous", _ATTRIBUTES, "warning")
-INITIAL_RULE = Rule("variable.initial", _TYPE_SPECIFIC, "warning")
-INITIAL_NOT_ALLOWED = Rule("variable.initial-not-allowed", _TYPE_SPECIFIC, "warning")
-INDEPENDENT = Rule("variable.independent", _ATTRIBUTES, "warning")
-REFERENCE = Rule("reference.value", _ATTRIBUTES)
-SHARED = Rule("reference.shared", _ATTRIBUTES)
-ALIAS = Rule("reference.alias", _ATTRIBUTES, "warning")
-DECLARED = Rule("variable.declared-type", _TYPE_SPECIFIC, "warning")
-OTHER_TYPE = Rule("variable.other-type", _TYPE_SPECIFIC)
-UNIT = Rule("variable.unit", _UNITS, "warning")
-DISPLAY_UNIT = Rule("variable.display-unit", _UNITS, "warning")
-DERIVATIVE = Rule("variable.derivative", _TYPE_SPECIFIC)
-CLOCK = Rule("variable.clocks", "FMI 3.0.2 section 2.4.7.4")
-
 _ATTRIBUTE_VALUES = {
-    "causality": (
-        "parameter",
-        "calculatedParameter",
-        "input",
-        "output",
-        "local",
-        "independent",
-        "structuralParameter",
-    ),
-    "variability": ("constant", "fixed", "tunable", "discrete", "continuous"),
-    "initial": ("exact", "approx", "calculated"),
+    "causality": """
+        parameter calculatedParameter input output local independent structuralParameter
+    """,
+    "variability": "constant fixed tunable discrete continuous",
+    "initial": "exact approx calculated",
 }
 _NAME_PATTERN = (
     r"(?:[A-Za-z_][A-Za-z0-9_]*|'(?:[A-Za-z0-9_!#$%&()*+,\-./:;<>=?@\[\]^{}|~ "
@@ -85,16 +50,16 @@ def check_identity(model: ModelDescription) -> Iterator[Violation]:
     for name, line in _all_names(model):
         if not name or not name.isprintable():
             text = f'found the variable name "{name}", expected one without control characters'
-            yield NAME, line, text
+            yield "variable.name", line, text
         elif is_structured and not _STRUCTURED_NAME.fullmatch(name):
             text = f'the name "{name}" does not follow the structured naming convention'
-            yield CONVENTION, line, text
+            yield "variable.convention", line, text
         if name in first_lines:
             text = (
                 f'the variable name "{name}" is already used in line {first_lines[name]}; this one '
                 "is ignored"
             )
-            yield UNIQUE, line, text
+            yield "variable.unique", line, text
         first_lines.setdefault(name, line)
 
 
@@ -109,22 +74,27 @@ def check_kinds(model: ModelDescription) -> Iterator[Violation]:
     """Check that type, causality, variability and initial are valid and allowed in combination."""
     for variable in model.variables:
         if not variable.kind:
-            yield KIND, variable, "has no type that this FMI version defines"
+            yield "variable.type", variable, "has no type that this FMI version defines"
         invalid_values = list(_check_attribute_values(variable))
         yield from invalid_values
         if not invalid_values and variable.kind != "Clock":
             yield from _check_combination(model, variable)
     count = sum(variable.causality == "independent" for variable in model.variables)
     if count > 1 or (model.major == 3 and count == 0):
-        yield INDEPENDENT, model.lines[""], f"found {count} independent variables, expected one"
+        yield (
+            "variable.independent",
+            model.lines[""],
+            f"found {count} independent variables, expected one",
+        )
 
 
 def _check_attribute_values(variable: ModelVariable) -> Iterator[Violation]:
-    for attribute, words in _ATTRIBUTE_VALUES.items():
+    for attribute, allowed in _ATTRIBUTE_VALUES.items():
+        words = allowed.split()
         word = variable.attributes.get(attribute, words[0])
         if word not in words:
             text = f'found {attribute}="{word}"{did_you_mean(word, words)}'
-            yield ATTRIBUTE_VALUE, variable, text
+            yield "variable.word", variable, text
 
 
 def _check_combination(model: ModelDescription, variable: ModelVariable) -> Iterator[Violation]:
@@ -132,14 +102,14 @@ def _check_combination(model: ModelDescription, variable: ModelVariable) -> Iter
     allowed = ALLOWED_INITIAL.get((causality, variability))
     if allowed is None:
         text = f'causality="{causality}" is not allowed with variability="{variability}"'
-        yield COMBINATION, variable, text
+        yield "variable.combination", variable, text
         return
     if variability == "continuous" and variable.kind and not variable.is_float:
         text = (
             f'type {variable.kind} is not allowed with variability="continuous"; it is treated as '
             "discrete"
         )
-        yield CONTINUOUS, variable, text
+        yield "variable.continuous", variable, text
     if (
         model.major == 2
         and "variability" not in variable.attributes
@@ -150,17 +120,17 @@ def _check_combination(model: ModelDescription, variable: ModelVariable) -> Iter
             f"lacks the attribute variability; its default is continuous, but {variable.kind} is "
             "treated as discrete"
         )
-        yield IMPLIED, variable, text
+        yield "variable.implied-continuous", variable, text
     initial = variable.attributes.get("initial")
     if initial and (causality == "independent" or (causality == "input" and model.major == 2)):
         text = f'found initial="{initial}", expected none for causality="{causality}"'
-        yield INITIAL_NOT_ALLOWED, variable, text
+        yield "variable.initial-not-allowed", variable, text
     elif initial and initial not in allowed:
         text = (
             f'initial="{initial}" is not allowed with causality="{causality}" and '
             f'variability="{variability}"'
         )
-        yield INITIAL_RULE, variable, text
+        yield "variable.initial", variable, text
 
 
 def check_references(model: ModelDescription) -> Iterator[Violation]:
@@ -170,21 +140,17 @@ def check_references(model: ModelDescription) -> Iterator[Violation]:
         text = variable.attributes.get("valueReference", "")
         if not re.fullmatch(r"\s*\+?[0-9]{1,10}\s*", text) or int(text) >= 2**32:
             message = f'found valueReference="{text}", expected an integer from 0 to 4294967295'
-            yield REFERENCE, variable, message
+            yield "reference.value", variable, message
         else:
             kind = _ACCESSOR_TYPES.get(variable.kind, variable.kind) if model.major < 3 else ""
             groups[kind, int(text)].append(variable)
     for group in groups.values():
-        if len(group) > 1 and model.major > 1:  # FMI 1.0 allows aliases of all variables
-            yield from (
-                _check_shared_references(group) if model.major == 3 else _check_aliases(group)
-            )
-
-
-def _check_shared_references(group: Sequence[ModelVariable]) -> Iterator[Violation]:
-    for variable in group[1:]:
-        text = f'has the same value reference as "{group[0].name}", expected a unique one'
-        yield SHARED, variable, text
+        if model.major == 3:
+            for variable in group[1:]:
+                text = f'has the same value reference as "{group[0].name}", expected a unique one'
+                yield "reference.shared", variable, text
+        elif model.major == 2:  # FMI 1.0 allows aliases of all variables
+            yield from _check_aliases(group)
 
 
 def _check_aliases(group: Sequence[ModelVariable]) -> Iterator[Violation]:
@@ -194,14 +160,18 @@ def _check_aliases(group: Sequence[ModelVariable]) -> Iterator[Violation]:
             f'has the same value reference as "{settable[0].name}", expected a unique one for each '
             "input and parameter"
         )
-        yield SHARED, variable, text
+        yield "reference.shared", variable, text
     first = group[0]
     for variable in group[1:]:
         if (variable.variability == "constant") != (first.variability == "constant"):
             text = f'is an alias of "{first.name}", but only one of them is constant'
-            yield ALIAS, variable, text
+            yield "reference.alias", variable, text
         if variable.attribute("unit") != first.attribute("unit"):
-            yield ALIAS, variable, f'is an alias of "{first.name}", but has another unit'
+            yield (
+                "reference.alias",
+                variable,
+                f'is an alias of "{first.name}", but has another unit',
+            )
 
 
 def check_declarations(model: ModelDescription) -> Iterator[Violation]:
@@ -213,29 +183,33 @@ def check_declarations(model: ModelDescription) -> Iterator[Violation]:
         state = variable.attributes.get("derivative", "").strip()
         if state and (state not in model.by_reference or not model.by_reference[state].is_float):
             text = f'found derivative="{state}", expected a reference to a floating-point variable'
-            yield DERIVATIVE, variable, text
+            yield "variable.derivative", variable, text
         for clock in variable.attributes.get("clocks", "").split():
             if clock not in model.by_reference or model.by_reference[clock].kind != "Clock":
                 text = f'found "{clock}" in its clocks, expected a reference to a clock'
-                yield CLOCK, variable, text
+                yield "variable.clocks", variable, text
 
 
 def _check_declared_type(model: ModelDescription, variable: ModelVariable) -> Iterator[Violation]:
     name = variable.attributes.get("declaredType")
     if name is None:
         if variable.kind == "Enumeration" and model.major > 1:
-            yield DECLARED, variable, "is an enumeration without declaredType"
+            yield "variable.declared-type", variable, "is an enumeration without declaredType"
     elif variable.declared_type is None:
         hint = did_you_mean(
             name, (definition.name for definition in model.types[:_MAX_HINT_CANDIDATES])
         )
-        yield DECLARED, variable, f'found declaredType="{name}", which is not defined{hint}'
+        yield (
+            "variable.declared-type",
+            variable,
+            f'found declaredType="{name}", which is not defined{hint}',
+        )
     elif variable.kind and variable.declared_type.kind not in ("", variable.kind):
         text = (
             f'the type "{name}" is {variable.declared_type.kind}, but the variable is '
             f"{variable.kind}"
         )
-        yield OTHER_TYPE, variable, text
+        yield "variable.other-type", variable, text
 
 
 def _check_units(variable: ModelVariable, units: dict[str, Sequence[str]]) -> Iterator[Violation]:
@@ -244,29 +218,14 @@ def _check_units(variable: ModelVariable, units: dict[str, Sequence[str]]) -> It
     unit, display = variable.attribute("unit"), variable.attributes.get("displayUnit")
     if unit is not None and unit not in units:
         hint = did_you_mean(unit, islice(units, _MAX_HINT_CANDIDATES))
-        yield UNIT, variable, f'the unit "{unit}" is not defined{hint}'
+        yield "variable.unit", variable, f'the unit "{unit}" is not defined{hint}'
     elif display is not None and display not in units.get(unit or "", ()):
         text = f'the display unit "{display}" is not defined for unit "{unit or ""}"'
-        yield DISPLAY_UNIT, variable, text
+        yield "variable.display-unit", variable, text
 
 
 CHECKS = (check_identity, check_kinds, check_references, check_declarations)
 
-
-_START = "FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.5"
-_DIMENSION = "FMI 3.0.2 section 2.4.7.2"
-
-MISSING = Rule("start.missing", _START, "warning")
-UNEXPECTED = Rule("start.unwanted", _START, "warning")
-VALUE = Rule("start.value", _START)
-FINITE = Rule("start.finite", _START)
-INFINITE = Rule("start.infinite", _START, "warning")
-RANGE = Rule("start.range", _START, "warning")
-COUNT = Rule("start.count", "FMI 3.0.2 section 2.4.7.5")
-LIMIT = Rule("variable.limits", _START, "warning")
-LIMIT_VALUE = Rule("variable.limit-value", _START, "warning")
-DIMENSION = Rule("variable.dimension", _DIMENSION)
-SIZE = Rule("variable.size", "limits")
 
 #: largest number of elements of one array variable
 MAX_ARRAY_SIZE = 1_000_000
@@ -279,19 +238,22 @@ def check_starts(model: ModelDescription) -> Iterator[Violation]:
         if (
             variable.kind not in ("Clock", "") and model.major > 1
         ):  # FMI 1.0 requires no start values
-            yield from _check_start_presence(variable)
+            initial, causality = variable.initial, variable.causality
+            if not variable.start_words and (
+                initial in ("exact", "approx") or causality == "input"
+            ):
+                reason = "inputs" if causality == "input" else f'initial="{initial}"'
+                text = f"has no start value, which is required for {reason}"
+                yield "start.missing", variable, text
+            if variable.start_words is not None and (
+                initial == "calculated" or causality == "independent"
+            ):
+                reason = (
+                    "it is independent" if causality == "independent" else 'initial="calculated"'
+                )
+                yield "start.unwanted", variable, f"has a start value, but {reason}"
         if variable.kind not in _NON_NUMERIC_TYPES:
             yield from _check_start_values(variable)
-
-
-def _check_start_presence(variable: ModelVariable) -> Iterator[Violation]:
-    initial, causality = variable.initial, variable.causality
-    if not variable.start_words and (initial in ("exact", "approx") or causality == "input"):
-        reason = "inputs" if causality == "input" else f'initial="{initial}"'
-        yield MISSING, variable, f"has no start value, which is required for {reason}"
-    if variable.start_words is not None and (initial == "calculated" or causality == "independent"):
-        reason = "it is independent" if causality == "independent" else 'initial="calculated"'
-        yield UNEXPECTED, variable, f"has a start value, but {reason}"
 
 
 def _check_start_values(variable: ModelVariable) -> Iterator[Violation]:
@@ -304,15 +266,22 @@ def _check_start_values(variable: ModelVariable) -> Iterator[Violation]:
                 f'start value "{" ".join(variable.start_words or ())}" of {variable} is not a '
                 f"valid {variable.kind}"
             )
-            yield VALUE, variable.line, text
+            yield "start.value", variable.line, text
             return
         if not math.isfinite(number):
             is_allowed = math.isinf(number) and variable.causality not in ("input", "output")
             text = f"found start value {word}, expected a finite number"
-            yield INFINITE if is_allowed else FINITE, variable, text
+            yield "start.infinite" if is_allowed else "start.finite", variable, text
         elif not low <= number <= high:
-            yield RANGE, variable, f"found start value {word}, expected {low:g} to {high:g}"
-    yield from _check_enumeration_start(variable)
+            yield "start.range", variable, f"found start value {word}, expected {low:g} to {high:g}"
+    if variable.kind == "Enumeration" and variable.declared_type and variable.declared_type.items:
+        values = {item[1].strip() for item in variable.declared_type.items}
+        for word in variable.start_words or ():
+            if word not in values:
+                text = (
+                    f'found start value {word}, expected an item of "{variable.declared_type.name}"'
+                )
+                yield "start.range", variable, text
 
 
 def _read_limits(variable: ModelVariable) -> Generator[Violation, None, tuple[float, float]]:
@@ -326,11 +295,11 @@ def _read_limits(variable: ModelVariable) -> Generator[Violation, None, tuple[fl
             continue
         limit = read_limit(text)
         if limit is None:
-            yield LIMIT_VALUE, variable, f'found {name}="{text}", expected a number'
+            yield "variable.limit-value", variable, f'found {name}="{text}", expected a number'
         else:
             limits[name] = limit
     if limits["min"] > limits["max"]:
-        yield LIMIT, variable, f"min {limits['min']:g} is above max {limits['max']:g}"
+        yield "variable.limits", variable, f"min {limits['min']:g} is above max {limits['max']:g}"
         return -math.inf, math.inf
     return limits["min"], limits["max"]
 
@@ -351,17 +320,6 @@ def read_limit(text: str) -> float | None:
     return None if math.isnan(limit) else limit
 
 
-def _check_enumeration_start(variable: ModelVariable) -> Iterator[Violation]:
-    if variable.kind == "Enumeration" and variable.declared_type and variable.declared_type.items:
-        values = {item[1].strip() for item in variable.declared_type.items}
-        for word in variable.start_words or ():
-            if word not in values:
-                text = (
-                    f'found start value {word}, expected an item of "{variable.declared_type.name}"'
-                )
-                yield RANGE, variable, text
-
-
 def check_dimensions(model: ModelDescription) -> Iterator[Violation]:
     """Check dimensions and numbers of start values of arrays, and the number of all elements."""
     scalars = 0
@@ -374,7 +332,11 @@ def check_dimensions(model: ModelDescription) -> Iterator[Violation]:
             continue
         size = math.prod(shape)
         if size > MAX_ARRAY_SIZE:
-            yield SIZE, variable, f"has {size} elements, expected at most {MAX_ARRAY_SIZE}"
+            yield (
+                "variable.size",
+                variable,
+                f"has {size} elements, expected at most {MAX_ARRAY_SIZE}",
+            )
             continue
         scalars += size * (1 + len(variable.aliases))
         if scalars > MAX_SCALARS:
@@ -382,12 +344,12 @@ def check_dimensions(model: ModelDescription) -> Iterator[Violation]:
                 f"the variables up to this one have {scalars} elements, expected at most "
                 f"{MAX_SCALARS}"
             )
-            yield SIZE, variable, text
+            yield "variable.size", variable, text
             return
         if variable.start_words and len(variable.start_words) not in (1, size):
             count = len(variable.start_words)
             text = f"found {count} start value{'s' if count > 1 else ''}, expected {size}"
-            yield COUNT, variable, text
+            yield "start.count", variable, text
 
 
 def _read_shape(
@@ -402,7 +364,11 @@ def _read_shape(
         if size is None or size < 1:
             found = " ".join(f'{name}="{text}"' for name, text in dimension.items()) or "nothing"
             expected = "start > 0, or the value reference of a structural parameter with start > 0"
-            yield DIMENSION, variable, f"found a dimension with {found}, expected {expected}"
+            yield (
+                "variable.dimension",
+                variable,
+                f"found a dimension with {found}, expected {expected}",
+            )
     valid = [size for size in sizes if size]
     return valid if len(valid) == len(sizes) else None
 

@@ -16,10 +16,9 @@ from lxml import etree
 
 from . import Examination, examine
 from .archive import Archive, open_regular_file
-from .findings import DESCRIPTION_FILE, FatalFindingError, Finding, Rule
+from .findings import DESCRIPTION_FILE, FatalFindingError, Finding
 from .xml import parse_xml
 
-SCHEMA = Rule("xml.schema", "XML schemas of FMI 1.0.1, 2.0.5 and 3.0.2", "warning")
 #: (FMI major version, member of the archive) -> schema file of FMPy
 SCHEMA_FILES = {
     (1, DESCRIPTION_FILE): "fmi1/fmiModelDescription.xsd",
@@ -50,7 +49,7 @@ def check_schema(root: Any, member: str, major: int) -> Iterator[Finding]:
     schema = _load_schema(SCHEMA_FILES[major, member])
     if not schema.validate(root):
         for error in schema.error_log:
-            yield SCHEMA(error.message.rstrip("."), member, error.line)
+            yield Finding("xml.schema", error.message.rstrip("."), member, error.line)
 
 
 #: largest model that is checked by schemas, because their uniqueness constraints take quadratic
@@ -76,20 +75,18 @@ def validate_fmu(path: Path) -> Sequence[Finding]:
         with open_regular_file(path) as file:
             archive = Archive(file)
             findings += archive.verify()
-            if all(finding.rule.severity == "warning" for finding in findings):
+            if all(finding.severity == "warning" for finding in findings):
                 findings += _check_xml_files(archive, examination)
     # a schema often reports, less clearly, the same problem as a rule
     locations = {
-        finding.location
-        for finding in findings
-        if finding.line and finding.rule.name != "xml.schema"
+        finding.location for finding in findings if finding.line and finding.rule != "xml.schema"
     }
     unique = [
         finding
         for finding in findings
-        if finding.rule.name != "xml.schema" or finding.location not in locations
+        if finding.rule != "xml.schema" or finding.location not in locations
     ]
-    return sorted(dict.fromkeys(unique), key=lambda finding: finding.rule.severity)
+    return sorted(dict.fromkeys(unique), key=lambda finding: finding.severity)
 
 
 def _check_xml_files(archive: Archive, examination: Examination) -> Iterator[Finding]:

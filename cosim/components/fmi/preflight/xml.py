@@ -11,12 +11,7 @@ from typing import Any
 from lxml import etree
 
 from ....core.text import MAX_TEXT_LENGTH
-from .findings import FatalFindingError, Rule
-
-SIZE = Rule("xml.size", "limits")
-ENCODING = Rule("xml.encoding", "FMI 2.0.5 section 2.2, FMI 3.0.2 section 2.4")
-DOCTYPE = Rule("xml.doctype", "safety: entities")
-SYNTAX = Rule("xml.syntax", "XML 1.0")
+from .findings import FatalFindingError
 
 #: largest size of an XML file (bytes) and number of its tags
 MAX_XML_SIZE, MAX_XML_TAGS = 1 << 25, 1_000_000
@@ -49,23 +44,27 @@ def parse_xml(content: bytes, member: str) -> Any:
     """
     if len(content) > MAX_XML_SIZE:
         raise FatalFindingError(
-            SIZE(f"has {len(content)} bytes, expected at most {MAX_XML_SIZE}", member)
+            "xml.size", f"has {len(content)} bytes, expected at most {MAX_XML_SIZE}", member
         )
     content = _to_utf8(content, member)
     if (position := content.find(b"<!DOCTYPE")) >= 0:
         raise FatalFindingError(
-            DOCTYPE("found a DOCTYPE, expected none", member, content.count(b"\n", 0, position) + 1)
+            "xml.doctype",
+            "found a DOCTYPE, expected none",
+            member,
+            content.count(b"\n", 0, position) + 1,
         )
     if (tags := content.count(b"<")) > MAX_XML_TAGS:
-        raise FatalFindingError(SIZE(f"has {tags} tags, expected at most {MAX_XML_TAGS}", member))
+        raise FatalFindingError(
+            "xml.size", f"has {tags} tags, expected at most {MAX_XML_TAGS}", member
+        )
     root = _parse_tree(content, member)
     for element in _TOO_MANY_ATTRIBUTES(root):
         raise FatalFindingError(
-            SIZE(
-                f"<{element.tag}> has more than {_MAX_ATTRIBUTES} attributes",
-                member,
-                element.sourceline,
-            )
+            "xml.size",
+            f"<{element.tag}> has more than {_MAX_ATTRIBUTES} attributes",
+            member,
+            element.sourceline,
         )
     for text in _TOO_LONG_TEXTS(root, length=MAX_TEXT_LENGTH):
         where = f'attribute "{text.attrname}"' if text.is_attribute else "text"
@@ -73,7 +72,7 @@ def parse_xml(content: bytes, member: str) -> Any:
             f"<{text.getparent().tag}> has {where} with {len(text)} characters, expected at most "
             f"{MAX_TEXT_LENGTH}"
         )
-        raise FatalFindingError(SIZE(found, member, text.getparent().sourceline))
+        raise FatalFindingError("xml.size", found, member, text.getparent().sourceline)
     return root
 
 
@@ -86,18 +85,21 @@ def _to_utf8(content: bytes, member: str) -> bytes:
     encoding = mark_encoding or (declared.group(1).decode().lower() if declared else "utf-8")
     if mark_encoding is None and encoding not in _ENCODINGS:
         raise FatalFindingError(
-            ENCODING(f'found encoding "{encoding}", expected "UTF-8"', member, 1)
+            "xml.encoding", f'found encoding "{encoding}", expected "UTF-8"', member, 1
         )
     try:
         text = content.decode(encoding)
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise FatalFindingError(
-            ENCODING(f"is not {encoding.removesuffix('-sig')} text: {error.reason}", member, line)
+            "xml.encoding",
+            f"is not {encoding.removesuffix('-sig')} text: {error.reason}",
+            member,
+            line,
         ) from None
     if "\0" in text:
         raise FatalFindingError(
-            ENCODING("contains null characters, expected UTF-8 text", member, 1)
+            "xml.encoding", "contains null characters, expected UTF-8 text", member, 1
         )
     return content if encoding == "utf-8" else text.encode()
 
@@ -118,9 +120,9 @@ def _parse_tree(content: bytes, member: str) -> Any:
         line, column = error.position
         if _LIBRARY_LIMIT in error.msg:
             found = f"has an attribute or text with more than {MAX_TEXT_LENGTH} characters"
-            raise FatalFindingError(SIZE(found, member, line)) from None
+            raise FatalFindingError("xml.size", found, member, line) from None
         raise FatalFindingError(
-            SYNTAX(f"is not well-formed XML: {error.msg} (column {column})", member, line)
+            "xml.syntax", f"is not well-formed XML: {error.msg} (column {column})", member, line
         ) from None
     except (ValueError, LookupError) as error:
-        raise FatalFindingError(SYNTAX(f"is not well-formed XML: {error}", member)) from None
+        raise FatalFindingError("xml.syntax", f"is not well-formed XML: {error}", member) from None

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from ....core.component import DTYPES
-from .findings import DESCRIPTION_FILE, FatalFindingError, Finding, Rule
+from .findings import DESCRIPTION_FILE, FatalFindingError, Finding
 from .model_description import (
     Interface,
     ModelDescription,
@@ -59,13 +59,7 @@ def _read_fmi1_interfaces(root: Any) -> dict[Interface, dict[str, str]]:
         return {"model-exchange": identifier}
     if (stand_alone := implementation.find(_STAND_ALONE)) is None:
         return {}
-    capabilities = stand_alone.find("Capabilities")
-    return {
-        "co-simulation": {
-            **({} if capabilities is None else dict(capabilities.items())),
-            **identifier,
-        }
-    }
+    return {"co-simulation": _read_attributes(stand_alone.find("Capabilities")) | identifier}
 
 
 def _read_fmi1_units(root: Any) -> Iterator[UnitDefinition]:
@@ -80,11 +74,6 @@ def _read_fmi1_units(root: Any) -> Iterator[UnitDefinition]:
         ]
         yield UnitDefinition(element.get("unit", ""), None, display, element.sourceline)
 
-
-_ROOT = "FMI 2.0.5 section 2.2.1, FMI 3.0.2 section 2.4.1"
-ROOT = Rule("model.root", _ROOT)
-VERSION = Rule("model.version", _ROOT)
-REPEATED = Rule("model.repeated", _ROOT)
 
 #: names of type elements -> FMI 3.0 type names, by FMI major version
 _FMI2_TYPES = {
@@ -132,11 +121,10 @@ def read_model(root: Any) -> ModelDescription:
     """
     if root.tag != "fmiModelDescription":
         raise FatalFindingError(
-            ROOT(
-                f"found <{root.tag}>, expected <fmiModelDescription>",
-                DESCRIPTION_FILE,
-                root.sourceline,
-            )
+            "model.root",
+            f"found <{root.tag}>, expected <fmiModelDescription>",
+            DESCRIPTION_FILE,
+            root.sourceline,
         )
     version = root.get("fmiVersion")
     if version is None or not _SUPPORTED_VERSION.fullmatch(version):
@@ -145,9 +133,10 @@ def read_model(root: Any) -> ModelDescription:
             pre_release = ", a pre-release, whose C functions differ" if "-" in version else ""
             found = f"is an FMI {version} FMU{pre_release}"
         raise FatalFindingError(
-            VERSION(
-                f"{found}; FMI 1.0, 2.0 and 3.0 are supported", DESCRIPTION_FILE, root.sourceline
-            )
+            "model.version",
+            f"{found}; FMI 1.0, 2.0 and 3.0 are supported",
+            DESCRIPTION_FILE,
+            root.sourceline,
         )
     major = int(version[0])
     types = [_read_type(element, major) for element in root.iterfind("TypeDefinitions/*")]
@@ -190,7 +179,8 @@ def check_repeated_elements(root: Any) -> Iterator[Finding]:
     counts = Counter(element.tag for element in root)
     for tag, count in counts.items():
         if count > 1:
-            yield REPEATED(
+            yield Finding(
+                "model.repeated",
                 f"<{tag}> occurs {count} times, expected once",
                 DESCRIPTION_FILE,
                 root.find(tag).sourceline,

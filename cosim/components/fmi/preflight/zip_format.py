@@ -11,20 +11,15 @@ from __future__ import annotations
 
 import os
 import struct
-from dataclasses import dataclass
 from io import BufferedReader
+from typing import NamedTuple
 
 from ....core.text import count_noun
-from .findings import FatalFindingError, Rule
+from .findings import FatalFindingError
 
-NO_ZIP = Rule("archive.zip", "APPNOTE 4.3")
-TRAILING = Rule("archive.trailing-data", "APPNOTE 4.3.16")
-CENTRAL_DIRECTORY = Rule("archive.contents", "APPNOTE 4.3.12")
-HEADER = Rule("archive.header", "APPNOTE 4.3.7")
-
-#: end of central directory record
-_EOCD = struct.Struct("<4s4H2LH")
-_CENTRAL_HEADER, _LOCAL_HEADER = struct.Struct("<4s6H3L5H2L"), struct.Struct("<4s5H3L2H")
+#: formats of the end of central directory record and of the headers, without unused fields
+_EOCD = struct.Struct("<4x4H2LH")
+_CENTRAL_HEADER, _LOCAL_HEADER = struct.Struct("<8x2H4x3L3H4x2L"), struct.Struct("<6x2H4x3L2H")
 _EOCD_SIGNATURE, _CENTRAL_SIGNATURE, _LOCAL_SIGNATURE = b"PK\x05\x06", b"PK\x01\x02", b"PK\x03\x04"
 _MAX_COMMENT_SIZE = 0xFFFF
 #: largest accepted number of files and folders in the archive
@@ -38,8 +33,7 @@ _ZIP64_HEADER_ID = 1
 ENCRYPTED, HAS_DATA_DESCRIPTOR, UTF8 = 0x2041, 0x8, 0x800
 
 
-@dataclass(frozen=True, slots=True)
-class ZipEntry:
+class ZipEntry(NamedTuple):
     """Central directory header of one member.
 
     Attributes:
@@ -96,14 +90,13 @@ def read_central_directory(file: BufferedReader) -> tuple[list[ZipEntry], int]:
     count, size, offset = _read_eocd(file)
     if count > MAX_MEMBERS:
         raise FatalFindingError(
-            CENTRAL_DIRECTORY(f"found {count} members, expected at most {MAX_MEMBERS}")
+            "archive.contents", f"found {count} members, expected at most {MAX_MEMBERS}"
         )
     if size > MAX_MEMBERS * _MAX_HEADER_SIZE:
         raise FatalFindingError(
-            CENTRAL_DIRECTORY(
-                f"found a central directory of {size} bytes, expected at most "
-                f"{MAX_MEMBERS * _MAX_HEADER_SIZE}"
-            )
+            "archive.contents",
+            f"found a central directory of {size} bytes, expected at most "
+            f"{MAX_MEMBERS * _MAX_HEADER_SIZE}",
         )
     file.seek(offset)
     directory = file.read(size)
@@ -116,7 +109,7 @@ def read_central_directory(file: BufferedReader) -> tuple[list[ZipEntry], int]:
             f"the central directory is {count_noun(size - position, 'byte')} longer than its "
             f"{count_noun(count, 'header')}"
         )
-        raise FatalFindingError(CENTRAL_DIRECTORY(text))
+        raise FatalFindingError("archive.contents", text)
     return entries, offset
 
 
@@ -131,28 +124,27 @@ def _read_eocd(file: BufferedReader) -> tuple[int, int, int]:
     position = tail.rfind(_EOCD_SIGNATURE)
     if position < 0 or len(tail) - position < _EOCD.size:
         raise FatalFindingError(
-            NO_ZIP("is not an FMU: it is not a ZIP file, or its end is missing")
+            "archive.zip", "is not an FMU: it is not a ZIP file, or its end is missing"
         )
-    _, disk, directory_disk, disk_count, count, size, offset, comment_size = _EOCD.unpack_from(
+    disk, directory_disk, disk_count, count, size, offset, comment_size = _EOCD.unpack_from(
         tail, position
     )
     surplus = len(tail) - position - _EOCD.size - comment_size
     if surplus or _is_in_comment(tail, position):
         raise FatalFindingError(
-            TRAILING(
-                f"found {count_noun(abs(surplus), 'byte')} behind the end of the archive or a "
-                "second end, expected neither"
-            )
+            "archive.trailing-data",
+            f"found {count_noun(abs(surplus), 'byte')} behind the end of the archive or a "
+            "second end, expected neither",
         )
     if (disk, directory_disk) != (0, 0) or disk_count != count:
-        raise FatalFindingError(CENTRAL_DIRECTORY("is one part of an archive in several parts"))
+        raise FatalFindingError("archive.contents", "is one part of an archive in several parts")
     end = length - _EOCD.size - comment_size
     if offset + size != end:
         text = (
             f"the central directory should end at byte {end}, found {offset + size} (truncated, or "
             "data in front?)"
         )
-        raise FatalFindingError(CENTRAL_DIRECTORY(text))
+        raise FatalFindingError("archive.contents", text)
     return count, size, offset
 
 
@@ -174,26 +166,10 @@ def _read_entry(directory: bytes, position: int) -> tuple[ZipEntry, int]:
         _CENTRAL_SIGNATURE, position
     ):
         raise _damaged_directory_error(position)
-    fields = _CENTRAL_HEADER.unpack_from(directory, position)
-    (
-        _,
-        _,
-        _,
-        flags,
-        method,
-        _,
-        _,
-        crc,
-        compressed,
-        size,
-        name_size,
-        extra_size,
-        comment_size,
-        _,
-        _,
-        attributes,
-        offset,
-    ) = fields
+    flags, method, crc, compressed, size, *sizes, attributes, offset = _CENTRAL_HEADER.unpack_from(
+        directory, position
+    )
+    name_size, extra_size, comment_size = sizes
     name_begin = position + _CENTRAL_HEADER.size
     extra_begin = name_begin + name_size
     end = extra_begin + extra_size + comment_size
@@ -207,7 +183,7 @@ def _read_entry(directory: bytes, position: int) -> tuple[ZipEntry, int]:
 
 def _damaged_directory_error(position: int) -> FatalFindingError:
     return FatalFindingError(
-        CENTRAL_DIRECTORY(f"the central directory is damaged at its byte {position}")
+        "archive.contents", f"the central directory is damaged at its byte {position}"
     )
 
 
@@ -244,11 +220,9 @@ def find_data_offset(file: BufferedReader, entry: ZipEntry, end: int) -> int:
     header = file.read(_LOCAL_HEADER.size)
     if len(header) < _LOCAL_HEADER.size or not header.startswith(_LOCAL_SIGNATURE):
         raise FatalFindingError(
-            HEADER(f"found no member at byte {entry.offset}", entry.decoded_name)
+            "archive.header", f"found no member at byte {entry.offset}", entry.decoded_name
         )
-    _, _, flags, method, _, _, crc, compressed, size, name_size, extra_size = _LOCAL_HEADER.unpack(
-        header
-    )
+    flags, method, crc, compressed, size, name_size, extra_size = _LOCAL_HEADER.unpack(header)
     name, extra = file.read(name_size), file.read(extra_size)
     size, compressed = _apply_zip64(extra, size, compressed)
     pairs = {
@@ -270,6 +244,6 @@ def find_data_offset(file: BufferedReader, entry: ZipEntry, end: int) -> int:
                 f"its local file header has {label} {local!r}, the central directory has "
                 f"{central!r}"
             )
-            raise FatalFindingError(HEADER(text, entry.decoded_name))
+            raise FatalFindingError("archive.header", text, entry.decoded_name)
     data_offset: int = entry.offset + _LOCAL_HEADER.size + name_size + extra_size
     return data_offset

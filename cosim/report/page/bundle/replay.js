@@ -1,4 +1,4 @@
-/* made from sources b0c9fe1a03dc72949514f45a8cb47dccd0ad83fcc3f38229273053d3dcf58c93
+/* made from sources 0a8f83860f7270ef244a24c297c70568b2e489d90bbdff6ed2e7e7df320c6bb9
 
 three
 

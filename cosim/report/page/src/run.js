@@ -8,7 +8,7 @@ async function inflated(base64) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/** Decode a column of `cosim/report/samples.py`: bytes of equal weight are grouped, and each row is the difference from the last. */
+/** Decode a column of `cosim/report/replay.py`: bytes of equal weight are grouped, and each row is the difference from the last. */
 function column(bytes, rows, index) {
   const words = new Int32Array(rows);
   const start = 4 * rows * index;

@@ -103,7 +103,7 @@ def test_check_lists_the_process_of_each_component(probe, tmp_path, options, lin
     file = scenario(
         tmp_path, {"a": {"fmu": str(probe), "isolation": "fmu"}, "b": {"fmu": str(probe)}}
     )
-    assert cli._run_command_line(["check", str(file), *options]) == 0
+    assert cli.run_command_line(["check", str(file), *options]) == 0
     shown = [line.strip() for line in capsys.readouterr().out.splitlines()]
     assert set(lines) < set(shown)
 

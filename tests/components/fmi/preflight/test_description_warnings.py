@@ -358,8 +358,8 @@ def test_warnings_are_reported_but_do_not_prevent_a_run(name, good, tmp_path):
     version, old, new, rule, line, words = WARNINGS[name]
     path = with_change(old, new, good[version], tmp_path)
     findings = find_problems(path)
-    assert {f.rule.severity for f in findings} == {"warning"}
-    assert [(f.rule.name, f.line) for f in findings if words in f.message] == [(rule, line)]
+    assert {f.severity for f in findings} == {"warning"}
+    assert [(f.rule, f.line) for f in findings if words in f.message] == [(rule, line)]
     FmuFile(path).check_binary()
 
 
@@ -381,6 +381,6 @@ def test_structured_names_are_recognized(name, good, tmp_path):
 
 @pytest.mark.parametrize("name", ["a..b", "1a", "a[", "a[1", "a b", "der(a", "a.", "'a"])
 def test_other_names_break_the_convention(name, good, tmp_path):
-    assert [f.rule.name for f in find_problems(structured(name, good, tmp_path))] == [
+    assert [f.rule for f in find_problems(structured(name, good, tmp_path))] == [
         "variable.convention"
     ]

@@ -123,6 +123,6 @@ def test_styles_of_exporters_are_accepted(style, good, tmp_path):
     FmuFile(path).check_binary()
     assert FmuFile(path).description.variables
     findings = [
-        finding for finding in find_problems(path) if finding.rule.name != "binary.functions"
+        finding for finding in find_problems(path) if finding.rule != "binary.functions"
     ]  # of the other interface
-    assert {finding.rule.severity for finding in findings} <= {"warning"}
+    assert {finding.severity for finding in findings} <= {"warning"}

@@ -8,8 +8,8 @@ import fmpy
 import pytest
 from bad_fmus import members, pack_archive
 
-from cosim.components.fmi.preflight import examine, macho, open_regular_file
-from cosim.components.fmi.preflight.archive import Archive
+from cosim.components.fmi.preflight import examine, macho
+from cosim.components.fmi.preflight.archive import Archive, open_regular_file
 from cosim.components.fmi.preflight.binary import check_binary
 from cosim.components.fmi.preflight.functions import standard_functions
 from cosim.components.fmi.preflight.platforms import FmuPlatform, InvalidLibraryError, SharedLibrary
@@ -159,7 +159,7 @@ def test_an_fmu_is_checked_for_macos(content, good, tmp_path, library, architect
                 machine,
             )
         )
-    assert [finding.rule.name for finding in findings] == (["binary.format"] if content else [])
+    assert [finding.rule for finding in findings] == (["binary.format"] if content else [])
 
 
 def test_mutants_are_read_or_refused(library, architecture):

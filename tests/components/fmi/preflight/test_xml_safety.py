@@ -195,7 +195,7 @@ def test_bad_xml_is_refused(case, good, tmp_path):
     assert time.process_time() - begin < 1
     assert f'"{path}": modelDescription.xml' in text
     assert words in text
-    assert find_problems(path)[0].rule.name == rule
+    assert find_problems(path)[0].rule == rule
 
 
 @pytest.mark.parametrize(
@@ -229,7 +229,7 @@ def test_other_xml_files_are_checked_too(member, good, tmp_path):
     xml = b'<!DOCTYPE x [<!ENTITY e SYSTEM "file:///etc/passwd">]><fmiBuildDescription>&e;</fmiBuildDescription>'
     path.write_bytes(pack_archive(members(good[3] | {member: xml})))
     (finding,) = find_problems(path)
-    assert (finding.rule.name, finding.location) == ("xml.doctype", f"{member}:1")
+    assert (finding.rule, finding.location) == ("xml.doctype", f"{member}:1")
 
 
 @pytest.mark.parametrize(
