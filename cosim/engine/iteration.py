@@ -96,7 +96,11 @@ class FixedPointIteration:
                         with calling_component(name, "set_state", "step", time):
                             self._components[name].set_state(state)
                 before = self._output_values()
-                self._iterate_once(is_first)
+                for transfers, delayed_transfers, steps in self._phases:
+                    for transfer in (*transfers, *delayed_transfers) if is_first else transfers:
+                        transfer()
+                    for step in steps:
+                        self._run_step(step)
                 is_first = False
                 return [
                     self._changed(old, new)
@@ -158,13 +162,6 @@ class FixedPointIteration:
 
         stack.callback(free)
         return state
-
-    def _iterate_once(self, first: bool) -> None:
-        for transfers, delayed_transfers, steps in self._phases:
-            for transfer in (*transfers, *delayed_transfers) if first else transfers:
-                transfer()
-            for step in steps:
-                self._run_step(step)
 
     def _output_values(self) -> list[np.ndarray]:
         return [array[offsets] for array, offsets in self._coupled_outputs]

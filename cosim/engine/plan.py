@@ -166,10 +166,15 @@ def compile_plan(system: System, settings: Settings) -> Plan:
     inside = frozenset(system.components)
     phases = list(_phases_of_stages(system.stages, system.parallel, inside, incoming))
     connections = list(chain.from_iterable(map(_connections_of, phases)))
-    inputs = _input_layout(system, connections)
-    outputs = _output_layout(
-        system, connections, settings.columns.values(), _extrapolated_sources(system, phases, set())
-    )
+    # inputs in the order of transfers, so that the targets of each are consecutive; outputs in the
+    # order of their first use
+    targets = [connection.target for connection in connections]
+    terms = [Variable(term_endpoint(c).scalar) for c in connections if c.term]
+    linear = [c.target for c in connections if c.interpolation == "linear"]
+    inputs = _layout_of_endpoints(system, targets, "input", terms, linear)
+    sources = [*(connection.source for connection in connections), *settings.columns.values()]
+    sloped = _extrapolated_sources(system, phases, set())
+    outputs = _layout_of_endpoints(system, sources, "output", (), sloped)
     planner = TransferPlanner(system, inputs, outputs, float(grid.step))
     stepped: set[str] = set()
 
@@ -273,20 +278,6 @@ def _phases_of_stages(
                 yield from inner
 
 
-def _input_layout(system: System, connections: Iterable[Connection]) -> Layout:
-    """Lay out the inputs in the order of transfers, so that the targets of each are consecutive."""
-    connections = list(connections)
-    terms = [
-        Variable(term_endpoint(connection).scalar) for connection in connections if connection.term
-    ]
-    linear = [
-        connection.target for connection in connections if connection.interpolation == "linear"
-    ]
-    return _layout_of_endpoints(
-        system, (connection.target for connection in connections), "input", terms, linear
-    )
-
-
 def _extrapolated_sources(
     system: System, phases: Iterable[_PhaseDraft], stepped: set[str]
 ) -> Iterator[Endpoint]:
@@ -302,31 +293,12 @@ def _extrapolated_sources(
         yield from _extrapolated_sources(system, phase.inner, stepped)
 
 
-def _output_layout(
-    system: System,
-    connections: Iterable[Connection],
-    recorded: Iterable[Endpoint],
-    sloped: Iterable[Endpoint],
-) -> Layout:
-    """Lay out the connected and recorded outputs in the order of their first use.
-
-    With the slopes of some of them.
-    """
-    return _layout_of_endpoints(
-        system,
-        (*(connection.source for connection in connections), *recorded),
-        "output",
-        (),
-        sloped,
-    )
-
-
 def _layout_of_endpoints(
     system: System,
     endpoints: Iterable[Endpoint],
     causality: Causality,
-    terms: Sequence[Variable] = (),
-    sloped: Iterable[Endpoint] = (),
+    terms: Sequence[Variable],
+    sloped: Iterable[Endpoint],
 ) -> Layout:
     used: dict[str, dict[str, Variable]] = {name: {} for name in component_names(system.stages)}
     for endpoint in endpoints:
@@ -347,19 +319,16 @@ def _layout_of_endpoints(
 def _variables_to_bind(
     component: Component, used: Mapping[str, Variable], causality: Causality
 ) -> Sequence[Variable]:
-    if not component.binds_everything:
-        return _group_by_type(list(used.values()))
-    own = [variable for variable in component.variables if variable.causality == causality]
-    return [*own, *(variable for variable in used.values() if variable.causality != causality)]
+    """Return the variables that are used, or all of the causality and the others that are used.
 
-
-def _group_by_type(variables: Sequence[Variable]) -> list[Variable]:
-    """Group variables by type, so that one FMI call sets or gets all of a type.
-
+    Used variables are grouped by type, so that one FMI call sets or gets all of a type.
     Enumerations count as integers.
     """
+    if component.binds_everything:
+        own = [variable for variable in component.variables if variable.causality == causality]
+        return [*own, *(variable for variable in used.values() if variable.causality != causality)]
     groups: dict[str, list[Variable]] = defaultdict(list)
-    for variable in variables:
+    for variable in used.values():
         is_enumeration = variable.type == "Enumeration"
         kind = f"Int{8 * variable.dtype.itemsize}" if is_enumeration else variable.type
         groups[kind].append(variable)

@@ -51,32 +51,29 @@ def compare(result: Result, reference: Result, tolerances: Mapping[str, Toleranc
     Raises:
         InputError: A tolerance is negative, NaN or infinite.
     """
-    if problems := list(_find_tolerance_problems(tolerances)):
+    problems = []
+    for pattern, tolerance in tolerances.items():
+        for name, value in tolerance._asdict().items():
+            if not 0 <= value < math.inf:
+                expected = "expected a finite number of at least 0"
+                problems.append(f'tolerance of "{pattern}": "{name}" is {value}, {expected}')
+    if problems:
         raise InputError(problems)
     selected = match_tolerances(tolerances, list(reference))
     unmatched = [pattern for pattern in tolerances if not reference.signals(pattern)]
-    general = [
+    verdicts = [
         Verdict(
             f'"{pattern}"', f"matches no signal of the reference{pattern_hint(pattern, reference)}"
         )
         for pattern in unmatched
     ]
-    if not len(reference.time) or not len(result.time):
-        return Comparison(
-            (
-                *general,
-                Verdict(
-                    "the reference" if not len(reference.time) else "the result", "has no rows"
-                ),
-            )
-        )
+    for role, run in (("the reference", reference), ("the result", result)):
+        if not len(run.time):
+            return Comparison((*verdicts, Verdict(role, "has no rows")))
     comparer = Comparer(result, reference)
-    return Comparison(
-        (
-            *general,
-            *(comparer.compare_signal(name, tolerance) for name, tolerance in selected.items()),
-        )
-    )
+    for name, tolerance in selected.items():
+        verdicts.append(comparer.compare_signal(name, tolerance))
+    return Comparison(tuple(verdicts))
 
 
 def needed_share(result: Result, reference: Result, tolerances: Mapping[str, Tolerance]) -> float:
@@ -100,16 +97,6 @@ def needed_share(result: Result, reference: Result, tolerances: Mapping[str, Tol
         ).passed
 
     return bisect_left(range(SHARE_STEPS), True, key=passes) / SHARE_STEPS
-
-
-def _find_tolerance_problems(tolerances: Mapping[str, Tolerance]) -> Iterator[str]:
-    for pattern, tolerance in tolerances.items():
-        for name, value in tolerance._asdict().items():
-            if not 0 <= value < math.inf:
-                yield (
-                    f'tolerance of "{pattern}": "{name}" is {value}, expected a finite number of '
-                    "at least 0"
-                )
 
 
 def match_tolerances(tolerances: Mapping[str, Tolerance], names: list[str]) -> dict[str, Tolerance]:
