@@ -83,14 +83,8 @@ class InputTable(Component):
     def do_step(self, time: float, step_size: float) -> None:
         """Move to the end of the step, or to a row's time that differs from it only by rounding."""
         end = time + step_size
-        row = (
-            int(
-                np.searchsorted(
-                    self._time, end + _MAX_ULPS * np.spacing(max(abs(time), abs(end))), side="right"
-                )
-            )
-            - 1
-        )
+        latest = end + _MAX_ULPS * np.spacing(max(abs(time), abs(end)))
+        row = int(np.searchsorted(self._time, latest, side="right")) - 1
         self._current_time = max(end, float(self._time[row])) if row >= 0 else end
 
     def get_outputs(self) -> None:
@@ -202,9 +196,7 @@ def parse_cell(text: str, variable: Variable | None) -> Any:
     Raises:
         ValueError: The text is not a value of the type.
     """
-    kind, dtype = (
-        ("Float64", DTYPES["Float64"]) if variable is None else (variable.type, variable.dtype)
-    )
+    kind = variable.type if variable else "Float64"
     if kind == "String":
         return text
     if kind == "Binary":
@@ -216,7 +208,7 @@ def parse_cell(text: str, variable: Variable | None) -> Any:
         return _parse_float(word)
     if variable and word in dict(variable.items):
         return dict(variable.items)[word]
-    limits = np.iinfo(dtype) if dtype.kind in "iu" else None
+    limits = np.iinfo(variable.dtype) if variable and variable.dtype.kind in "iu" else None
     number = _parse_integer(word)
     if (
         limits is None

@@ -186,7 +186,9 @@ def find_violations(candidate: Any) -> Iterator[str]:
     )
     variables = [entry for entry in entries if isinstance(entry, Variable)]
     yield from _check_entries(entries)
-    yield from _check_unique_names(variables)
+    for name, count in Counter(str(variable.name) for variable in variables).items():
+        if count > 1:
+            yield f'variable "{name}" is declared {count} times'
     for name in _required_methods(
         {variable.causality for variable in variables}, candidate.has_state
     ):
@@ -203,18 +205,10 @@ def find_violations(candidate: Any) -> Iterator[str]:
 def _check_entries(entries: Sequence[Any]) -> Iterator[str]:
     for entry in entries:
         if isinstance(entry, Variable):
-            yield from (
-                f'variable "{entry.name}": {text}' for text in _check_variable_fields(entry)
-            )
+            for text in _check_variable_fields(entry):
+                yield f'variable "{entry.name}": {text}'
         else:
             yield f'"variables" contains {entry!r}, expected a cosim.core.component.Variable'
-
-
-def _check_unique_names(variables: Sequence[Variable]) -> Iterator[str]:
-    names = Counter(str(variable.name) for variable in variables)
-    yield from (
-        f'variable "{name}" is declared {count} times' for name, count in names.items() if count > 1
-    )
 
 
 def _check_variable_fields(variable: Variable) -> Iterator[str]:

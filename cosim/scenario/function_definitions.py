@@ -56,16 +56,20 @@ def function_definition(spec: CallSpec, folder: Path) -> ast.FunctionDef:
     file, _, name = spec.python.rpartition(":")
     path = source_path(file, folder)
     assert path is not None
-    return function_definitions(path)[name]
+    return function_definitions(path, name)[name]
 
 
-def function_definitions(path: Path) -> dict[str, ast.FunctionDef]:
-    """Return the functions at the top level of a file, and those from files beside it, by name.
+def function_definitions(path: Path, wanted: str = "") -> Mapping[str, ast.FunctionDef]:
+    """Return the functions at the top level of a file by name.
+
+    If `wanted` is none of them, those that it imports from files beside it are included.
 
     Raises:
         SyntaxError: The file is not valid Python.
     """
     source = _parse(path.read_bytes())
+    if wanted in source.functions:
+        return source.functions
     found: dict[str, ast.FunctionDef] = {}
     for module, names in source.imported.items():
         file = path.with_name(f"{module}.py")

@@ -98,7 +98,7 @@ def definition_problem(spec: CallSpec, folder: Path) -> str:
         kind = "file" if file.endswith(".py") else "module"
         return f'{kind} "{file}" does not exist{nearest_file(path) if path else ""}'
     try:
-        functions = function_definitions(path)
+        functions = function_definitions(path, name)
     except SyntaxError as error:
         return f'"{file}" is not valid Python: {error.msg} (line {error.lineno})'
     if name not in functions:
@@ -195,15 +195,14 @@ def kpi_name_problem(kpi: str, kpis: Sequence[FunctionSpec], folder: Path) -> st
     """
     name, _, key = kpi.partition(".")
     values: dict[str, list[str]] = {}
-    for spec in kpis:
+    for spec in [each for each in kpis if each.name == name] or kpis:
         values[spec.name] = []
         if not definition_problem(spec, folder):
             values[spec.name] = kpi_value_names(function_definition(spec, folder))
     if name in values and (not values[name] or key.partition("[")[0] in values[name]):
         return ""
-    own = {name: values[name]} if name in values else values
     known: list[str] = []
-    for each, names in own.items():
+    for each, names in values.items():
         known += [f"{each}.{value}" for value in names] or [each]
     return f'no KPI "{kpi}"{kpi_hint(kpi.partition("[")[0], known)}'
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from ..core.component import Component, scalars_of
 from ..core.errors import Problem, pattern_hint
-from ..core.expressions import Expression, parse_condition
+from ..core.expressions import parse_condition
 from ..core.system import Endpoint
 from ..engine.settings import StopCondition
 from .name_resolution import PrefixIndex
@@ -112,10 +112,13 @@ def read_stop_conditions(
         try:
             expression = parse_condition(stop.when)
             text = expression.unknown_name_problem(columns, "recorded signal")
-            if not text:
-                text = next(_texts_in(expression, components, columns), "")
-            elif not is_complete:
+            if text and not is_complete:
                 continue
+            for name in () if text else expression.names:
+                component, scalar = columns[name]
+                if scalars_of(components[component].variables)[scalar].dtype.hasobject:
+                    text = f"{name} is a text, expected a number"
+                    break
         except ValueError as error:
             text = str(error)
         if text:
@@ -123,13 +126,3 @@ def read_stop_conditions(
         elif is_complete:
             conditions.append(StopCondition(stop.name, expression, stop.for_, stop.outcome))
     return conditions, problems
-
-
-def _texts_in(
-    expression: Expression, components: Mapping[str, Component], columns: Mapping[str, Endpoint]
-) -> Iterator[str]:
-    """Yield a problem for each signal of a condition that is a text."""
-    for name in expression.names:
-        component, scalar = columns[name]
-        if scalars_of(components[component].variables)[scalar].dtype.hasobject:
-            yield f"{name} is a text, expected a number"

@@ -69,16 +69,15 @@ def hint_at_quotes(value: Any, accepts: Callable[[Any], bool]) -> str:
     )
 
 
-def _check_positive(value: Fraction) -> Fraction:
-    if value <= 0:
-        raise ValueError("expected a positive number of seconds")
-    return value
+def _require(accepts: Callable[[Any], bool], expected: str) -> Callable[[Any], Any]:
+    """Return a validator that refuses what `accepts` does not accept."""
 
+    def check(value: Any) -> Any:
+        if not accepts(value):
+            raise ValueError(f"expected {expected}")
+        return value
 
-def _check_not_negative(value: Fraction) -> Fraction:
-    if value < 0:
-        raise ValueError("expected 0 s or more")
-    return value
+    return check
 
 
 def _check_value(value: Any) -> Any:
@@ -90,21 +89,9 @@ def _check_value(value: Any) -> Any:
     return value
 
 
-def _check_bool_or_number(value: Any) -> Any:
-    if not isinstance(value, bool | int | float):
-        raise ValueError("expected a number, true or false")
-    return value
-
-
 def _as_integer(value: Any) -> Any:
     """Return an integral float such as 1.0 as integer, which it is in JSON Schema."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
-
-
-def _check_auto_or_bool(value: Any) -> Any:
-    if value != "auto" and not isinstance(value, bool):
-        raise ValueError('expected "auto", true or false')
-    return value
 
 
 def _as_list(value: Any) -> Any:
@@ -132,12 +119,12 @@ Seconds = Annotated[
 ]
 Period = Annotated[
     Seconds,
-    AfterValidator(_check_positive),
+    AfterValidator(_require(lambda value: value > 0, "a positive number of seconds")),
     _time_schema(_POSITIVE_TIME_PATTERN, exclusiveMinimum=0),
 ]
 Duration = Annotated[
     Seconds,
-    AfterValidator(_check_not_negative),
+    AfterValidator(_require(lambda value: value >= 0, "0 s or more")),
     _time_schema(rf"^\+?{_UNSIGNED_TIME}", minimum=0),
 ]
 Gain = Annotated[
@@ -148,7 +135,9 @@ Gain = Annotated[
 Integer = Annotated[int, BeforeValidator(_as_integer)]
 BoolOrNumber = Annotated[
     bool | int | float,
-    BeforeValidator(_check_bool_or_number),
+    BeforeValidator(
+        _require(lambda value: isinstance(value, bool | int | float), "a number, true or false")
+    ),
     WithJsonSchema({"type": ["number", "boolean"]}),
 ]
 
@@ -167,7 +156,9 @@ Value = Annotated[
 ]
 AutoOrBool = Annotated[
     Literal["auto"] | bool,
-    BeforeValidator(_check_auto_or_bool),
+    BeforeValidator(
+        _require(lambda value: value == "auto" or isinstance(value, bool), '"auto", true or false')
+    ),
     WithJsonSchema({"enum": ["auto", True, False]}),
 ]
 NameList = Annotated[

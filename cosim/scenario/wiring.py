@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
-from itertools import chain
+from itertools import chain, starmap
 from typing import NamedTuple
 
 from ..core.component import Component, Variable, scalars_of
@@ -46,9 +46,9 @@ class _Source(NamedTuple):
         name = prefix.replace("*", rest) if "*" in prefix else prefix + rest
         return f"{component}.{name}".replace("..", ".")
 
-
-def _unmatched(end: Endpoint, source: _Source, rest: str, hint: str, where: str) -> Problem:
-    return Problem(f"input {end} {NO_MATCHING_OUTPUT} {source.expected_name(rest)}{hint}", where)
+    def unmatched(self, end: Endpoint, rest: str, hint: str, where: str) -> Problem:
+        """Return the problem of an input without a matching output."""
+        return Problem(f"input {end} {NO_MATCHING_OUTPUT} {self.expected_name(rest)}{hint}", where)
 
 
 def _kind_of_names(names: Iterable[str]) -> str:
@@ -124,30 +124,21 @@ class Wiring:
         return chain.from_iterable(each.connections for each in self._by_input.values())
 
     def _expand(self, node: Node, i: int, spec: ConnectionSpec) -> None:
-        path, where_to = ("connections", i, "from"), node.where("connections", i, "to")
-        indices = [(k,) if len(spec.sources) > 1 else () for k in range(len(spec.sources))]
-        sources = [
-            self._find_source(node, name, node.where(*path, *k))
-            for name, k in zip(spec.sources, indices, strict=True)
-        ]
-        inputs = self._slots_of_targets(
-            self._resolve(node, spec.target, "inputs", where_to), "input", where_to
-        )
-        found = [source for source in sources if source]
-        if len(found) < len(sources):
+        sources: list[_Source] = []
+        for k, name in enumerate(spec.sources):
+            index = (k,) if len(spec.sources) > 1 else ()
+            where = node.where("connections", i, "from", *index)
+            sources += starmap(_Source, self._slots_of_name(node, name, "output", where)[:1])
+        inputs = self._slots_of_name(node, spec.target, "input", node.where("connections", i, "to"))
+        if len(sources) < len(spec.sources):
             self.excuse(node, spec.target)
             return
         where = node.where("connections", i)
         for target, slots in inputs:
             ends = {rest: Endpoint(target.component, slot) for rest, slot in slots.items()}
             for rest, end in ends.items():
-                self._match(found, end, rest, spec, where)
-            self._join_problems_of_elements(found[0], ends, where)
-
-    def _find_source(self, node: Node, name: str, where: str) -> _Source | None:
-        """Return the outputs that a name refers to; None if there are none."""
-        found = self._slots_of_targets(self._resolve(node, name, "outputs", where), "output", where)
-        return _Source(*found[0]) if found else None
+                self._match(sources, end, rest, spec, where)
+            self._join_problems_of_elements(sources[0], ends, where)
 
     def _match(
         self, sources: Sequence[_Source], end: Endpoint, rest: str, spec: ConnectionSpec, where: str
@@ -158,9 +149,8 @@ class Wiring:
         """
         unmatched = [source for source in sources if rest not in source.outputs]
         if unmatched and end not in self._inputs_with_values:
-            self._unmatched_inputs[end] = _unmatched(
-                end, unmatched[0], rest, self._output_hint(unmatched[0], end, rest), where
-            )
+            hint = self._output_hint(unmatched[0], end, rest)
+            self._unmatched_inputs[end] = unmatched[0].unmatched(end, rest, hint, where)
         if unmatched:
             return
         connections = [
@@ -195,7 +185,7 @@ class Wiring:
         if all(self._fits(*pair) for pair in pairs):
             hint = abbreviate_names((f"{output} to {end}" for output, end in pairs), _MAX_PAIRS)
             rest, first = next(iter(unmatched.items()))
-            problem = _unmatched(first, source, rest, f"; connect {hint}", where)
+            problem = source.unmatched(first, rest, f"; connect {hint}", where)
             self._unmatched_inputs.update(dict.fromkeys(unmatched.values(), problem))
 
     def _output_hint(self, source: _Source, end: Endpoint, rest: str) -> str:
@@ -259,13 +249,14 @@ class Wiring:
                 self.problems.append(Problem(str(error), where))
             return []
 
-    def _slots_of_targets(
-        self, targets: Sequence[Target], causality: str, where: str
+    def _slots_of_name(
+        self, node: Node, name: str, causality: str, where: str
     ) -> list[tuple[Target, dict[str, str]]]:
-        """Return the scalars of a causality below each prefix.
+        """Return the scalars of a causality below each prefix that a name refers to.
 
         Add a problem if there are none at all.
         """
+        targets = self._resolve(node, name, f"{causality}s", where)
         slots_by_target = [(target, self._slots_of_target(target, causality)) for target in targets]
         if targets and not any(slots for _, slots in slots_by_target):
             self.problems.append(Problem(self._no_slots_message(targets[0], causality), where))

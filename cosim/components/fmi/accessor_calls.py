@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import groupby
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -23,8 +22,7 @@ _SLOPE_FUNCTIONS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class AccessorCallFactory:
+class AccessorCallFactory(NamedTuple):
     """Factory of the prepared get and set calls of one FMU instance.
 
     Slopes are set by fmi*SetRealInputDerivatives, and got by fmi*GetRealOutputDerivatives or

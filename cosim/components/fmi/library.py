@@ -139,17 +139,6 @@ _RESULT_TYPES = {
 }
 
 
-def _result_type(name: str) -> Any:
-    """Return the type of a function's result.
-
-    FMPy's annotations declare texts for statuses of FMI 1.0.
-    """
-    return next(
-        (kind for begin, kind in reversed(_RESULT_TYPES.items()) if name.startswith(begin)),
-        ctypes.c_int,
-    )
-
-
 class _SlaveFunctions(dict[str, Any]):
     """C functions as FMPy's slave object calls them, by name; each is created on first use.
 
@@ -167,7 +156,11 @@ class _SlaveFunctions(dict[str, Any]):
         except AttributeError:
             raise MissingFunctionError(name) from None
         function.argtypes = _argument_types(self._slave_class, name)
-        function.restype = _result_type(name[len("fmi1") :])
+        function.restype = ctypes.c_int
+        # FMPy's annotations declare texts for statuses of FMI 1.0
+        for begin, kind in _RESULT_TYPES.items():
+            if name.startswith(begin, len("fmi1")):
+                function.restype = kind
         if function.restype is ctypes.c_int:
             function.errcheck = _reject_negative_status
         self[name] = function

@@ -132,12 +132,20 @@ class WorkerProcess:
                 last_progress, since = progress, time.monotonic()
             elif time.monotonic() - since > deadline:
                 raise WorkerLostError(f"did not return within {deadline:g} s")
-            self._receive(
-                {
-                    descriptor
-                    for descriptor, _ in self._poller.wait(min(POLL_INTERVAL, deadline) * 1000)
-                }
-            )
+            ready = dict(self._poller.wait(min(POLL_INTERVAL, deadline) * 1000))
+            if self._output in ready:
+                self._forward_output()
+            if self._reader in ready:
+                data = os.read(self._reader, READ_SIZE)
+                self._received += data
+                if not data:
+                    raise self._lost_error()
+                if len(self._received) > _MAX_ANSWER_SIZE:
+                    raise WorkerLostError(
+                        f"its worker process sent more than {_MAX_ANSWER_SIZE} bytes at once"
+                    )
+            elif self._pidfd in ready:
+                raise self._lost_error()
 
     def _progress(self) -> tuple[int, int]:
         return self._journal[CHANGE_COUNT], self._journal[CALL_NUMBER]
@@ -150,21 +158,6 @@ class WorkerProcess:
                 self._received = b"\n".join([*lines[index + 1 :], self._received])
                 return line + b"\n"
         return None
-
-    def _receive(self, ready: set[int]) -> None:
-        if self._output in ready:
-            self._forward_output()
-        if self._reader in ready:
-            data = os.read(self._reader, READ_SIZE)
-            self._received += data
-            if not data:
-                raise self._lost_error()
-            if len(self._received) > _MAX_ANSWER_SIZE:
-                raise WorkerLostError(
-                    f"its worker process sent more than {_MAX_ANSWER_SIZE} bytes at once"
-                )
-        elif self._pidfd in ready:
-            raise self._lost_error()
 
     def _forward_log_message(self, line: bytes) -> bool:
         """Log the message if the line contains one; return whether it does."""

@@ -240,41 +240,38 @@ class VariableStepIntegrator(Integrator):
 
     # -- functions that CVODE calls
 
-    def _guarded(self, evaluate: Callable[[], None]) -> int:
-        """Return the result of a callback.
+    def _evaluate(
+        self, time: float, states: int, transfer: Callable[[int], None], result: int
+    ) -> int:
+        """Transfer the values at a time (s) and states to the address `result`.
 
         A discarded evaluation makes CVODE try a smaller step.
         """
         try:
-            evaluate()
+            self._model.set_time(time)
+            self._set_states(states)
+            transfer(result)
         except IntegrationError as error:
             self._failure = error
             return RECOVERABLE if error.status == DISCARD else FAILED
         return OK
 
     def _evaluate_derivatives(self, time: float, states: int, derivatives: int) -> int:
-        def evaluate() -> None:
-            self._model.set_time(time)
-            self._set_states(states)
-            self._get_derivatives(derivatives)
-
-        return self._guarded(evaluate)
+        return self._evaluate(time, states, self._get_derivatives, derivatives)
 
     def _evaluate_nothing(self, _time: float, _states: int, derivatives: int) -> int:
         ctypes.c_double.from_address(derivatives).value = 0.0
         return OK
 
     def _evaluate_indicators(self, time: float, states: int, indicators: int) -> int:
-        def evaluate() -> None:
-            self._model.set_time(time)
-            self._set_states(states)
-            self._get_indicators(indicators)
-            self._model.check_indicators(
-                np.ctypeslib.as_array((ctypes.c_double * count).from_address(indicators))
-            )
+        return self._evaluate(time, states, self._get_checked_indicators, indicators)
 
+    def _get_checked_indicators(self, address: int) -> None:
+        self._get_indicators(address)
         count = len(self._model.indicators)
-        return self._guarded(evaluate)
+        self._model.check_indicators(
+            np.ctypeslib.as_array((ctypes.c_double * count).from_address(address))
+        )
 
     # -- steps
 

@@ -24,7 +24,6 @@ _READERS: Mapping[str, Callable[[bytes, str], SharedLibrary]] = {
     ".dll": pe.read_library,
     ".dylib": macho.read_library,
 }
-_LIBRARY_SUFFIXES = (".so", ".dll", ".dylib")
 
 
 def list_platforms(names: Iterable[str]) -> list[str]:
@@ -40,7 +39,7 @@ def list_platforms(names: Iterable[str]) -> list[str]:
     folders = {
         part[1]
         for part in parts
-        if len(part) == 3 and part[0] == "binaries" and part[2].endswith(_LIBRARY_SUFFIXES)
+        if len(part) == 3 and part[0] == "binaries" and part[2].endswith(tuple(_READERS))
     }
     sources = any(
         part[0] == "sources" and part[-1].endswith((".c", ".cpp"))

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from ....core.errors import InputError
 from ....core.text import escape_control_characters
@@ -139,8 +138,7 @@ RUN_WARNINGS = frozenset(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
+class Finding(NamedTuple):
     """Violation of a rule of the FMI standard, of a file format or for safety.
 
     Attributes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -86,8 +86,7 @@ ALLOWED_INITIAL: Mapping[tuple[str, str], Sequence[str]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class TypeDefinition:
+class TypeDefinition(NamedTuple):
     """Declared type.
 
     Attributes:
@@ -105,8 +104,7 @@ class TypeDefinition:
     line: int
 
 
-@dataclass(frozen=True, slots=True)
-class ModelVariable:
+class ModelVariable(NamedTuple):
     """Model variable.
 
     Attributes:
@@ -164,8 +162,7 @@ def to_finding(rule: str, place: ModelVariable | int, message: str) -> Finding:
     return Finding(rule, f"{place}: {message}", DESCRIPTION_FILE, place.line)
 
 
-@dataclass(frozen=True, slots=True)
-class Unknown:
+class Unknown(NamedTuple):
     """Element of the model structure.
 
     Attributes:
@@ -183,8 +180,7 @@ class Unknown:
     line: int
 
 
-@dataclass(frozen=True, slots=True)
-class UnitDefinition:
+class UnitDefinition(NamedTuple):
     """Unit definition.
 
     Attributes:

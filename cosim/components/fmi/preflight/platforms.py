@@ -7,6 +7,7 @@ import struct
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 _SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
 _ARCHITECTURES = {
@@ -19,8 +20,7 @@ _ARCHITECTURES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class FmuPlatform:
+class FmuPlatform(NamedTuple):
     """Platform of an FMU binary.
 
     Attributes:

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import os
 import struct
-from dataclasses import dataclass
 from io import BufferedReader
+from typing import NamedTuple
 
 from ....core.text import count_noun
 from .findings import FatalFindingError
@@ -33,8 +33,7 @@ _ZIP64_HEADER_ID = 1
 ENCRYPTED, HAS_DATA_DESCRIPTOR, UTF8 = 0x2041, 0x8, 0x800
 
 
-@dataclass(frozen=True, slots=True)
-class ZipEntry:
+class ZipEntry(NamedTuple):
     """Central directory header of one member.
 
     Attributes:
