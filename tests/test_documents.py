@@ -112,7 +112,7 @@ def schema(example):
     "keeper", ["../controllers/python/course_keeper.py:CourseKeeper", "my_keeper.py:Keeper"]
 )
 def test_the_example_scenario_runs(tmp_path, keeper):
-    """With the KPI of the same page, and a gust to go with it; also with the page's own component."""
+    """With the KPI and the gust of the same page; also with the page's own component."""
     text = (ROOT / "docs/scenarios.md").read_text()
     (scenario,) = (
         block for block in re.findall(r"```json\n(.*?)```", text, re.DOTALL) if "stop_time" in block

@@ -35,7 +35,9 @@ OLD = """#define MODEL_IDENTIFIER ball
 #error no macro
 #endif
 fmiStatus fmiResetSlave(fmiComponent c) { return fmiOK; }
-fmiStatus ball_fmiSetDebugLogging(fmiComponent c, fmiBoolean on) { return on ? fmiResetSlave(c) : fmiWarning; }
+fmiStatus ball_fmiSetDebugLogging(fmiComponent c, fmiBoolean on) {
+  return on ? fmiResetSlave(c) : fmiWarning;
+}
 """
 
 
