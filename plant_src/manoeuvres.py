@@ -178,6 +178,7 @@ def turning_circle(
     tactical = abs(motion.interpolate(motion.position, half).imag)
     period, track_length = _last_full_turn(motion)
     speed = track_length / period
+    u, v = (np.interp(start, result.time, result[f"{vehicle}.velocity.{axis}"]) for axis in "xy")
     return {
         "advance": position.real,
         "transfer": abs(position.imag),
@@ -189,7 +190,7 @@ def turning_circle(
         "time_to_180": half - start,
         "period": period,
         "steady_speed": speed,
-        "speed_loss": 1 - speed / _speed_over_ground(result, vehicle, start),
+        "speed_loss": 1 - speed / math.hypot(u, v),
     }
 
 
@@ -202,12 +203,6 @@ def _last_full_turn(motion: Track) -> tuple[float, float]:
     return float(motion.time[-1]) - begin, float(motion.distance[-1]) - motion.interpolate(
         motion.distance, begin
     ).real
-
-
-def _speed_over_ground(result: Result, vehicle: str, time: float) -> float:
-    """Return the speed over ground (m/s) at `time` (s)."""
-    u, v = (np.interp(time, result.time, result[f"{vehicle}.velocity.{axis}"]) for axis in "xy")
-    return math.hypot(u, v)
 
 
 @better(overshoot="lower", initial_turning_time="lower", reach="lower")

@@ -373,7 +373,11 @@ class World(Component):
             self._contacts.clear()
         try:
             if self._has_environment:
-                self._advance_with_environment(time - self._start_time)
+                elapsed = time - self._start_time
+                for k, fraction in enumerate(self._step_fractions):
+                    self._environment.update(elapsed + k * self._bullet_step[0])
+                    self._advance(fraction)
+                self._environment.publish(elapsed + step_size)
             else:
                 for fraction in self._step_fractions:
                     self._advance(fraction)
@@ -394,13 +398,6 @@ class World(Component):
             component_log.log_message(
                 self._name, component_log.WARNING, f"t = {time:g} s: {message}"
             )
-
-    def _advance_with_environment(self, time: float) -> None:
-        """Make the Bullet steps with environment, from a time since the start (s)."""
-        for k, fraction in enumerate(self._step_fractions):
-            self._environment.update(time + k * self._bullet_step[0])
-            self._advance(fraction)
-        self._environment.publish(time + self._step_size)
 
     def _set_step_size(self, time: float, step_size: float) -> None:
         """Split the component's step into equal Bullet steps."""

@@ -87,7 +87,6 @@ def recorded_scenario(result: Result) -> dict[str, Any]:
     for name, value in about.get("parameters", {}).items():
         component, _, variable = name.partition(".")
         spec = scenario["components"][component]
-        scenario["components"] |= {
-            component: {**spec, "parameters": {**spec.get("parameters", {}), variable: value}}
-        }
+        parameters = {**spec.get("parameters", {}), variable: value}
+        scenario["components"][component] = {**spec, "parameters": parameters}
     return scenario

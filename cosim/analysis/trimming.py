@@ -132,13 +132,16 @@ class _Search:
         values: list[float] = []
         with load(self.scenario, self.parameters) as simulation:
             for name in self.free:
-                _refuse_connected(simulation.prepared, name)
-                present = _pointed(document, name) if name.startswith("/") else simulation.get(name)
+                if name.startswith("/"):
+                    keys = pointer_keys(name)
+                    present, depth = find_value(document, keys)
+                    if depth < len(keys):
+                        raise InputError(missing_value(document, name))
+                else:
+                    _refuse_connected(simulation.prepared, name)
+                    present = simulation.get(name)
                 self.sizes.append(len(present) if isinstance(present, list) else None)
-                values += [
-                    _number(name, each)
-                    for each in (present if isinstance(present, list) else [present])
-                ]
+                values += _elements(name, present).values()
         return values
 
     def settings(self, values: np.ndarray) -> dict[str, Any]:
@@ -185,8 +188,6 @@ class _Search:
 
 def _refuse_connected(prepared: PreparedRun, name: str) -> None:
     """Raise an error if a name stands for an input that a connection feeds."""
-    if name.startswith("/"):
-        return
     try:
         targets = resolve_name(prepared.root, name, ("inputs",), include_inner=True)
     except UnknownNameError:  # a parameter, or reported with the values
@@ -211,11 +212,3 @@ def _number(name: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(f'"{name}" is {value!r}, expected a number')
     return float(value)
-
-
-def _pointed(document: Any, pointer: str) -> Any:
-    keys = pointer_keys(pointer)
-    value, depth = find_value(document, keys)
-    if depth < len(keys):
-        raise InputError(missing_value(document, pointer))
-    return value

@@ -66,11 +66,13 @@ class ComparisonTask(NamedTuple):
         """
         if not isinstance(reference, Result) and is_scenario(Path(reference)):
             scenario = find_scenario(Path(reference))
-            file, tolerances = _scenario_reference(scenario)
-            run = _read_result(result)
-            return cls(
-                run, _read_result(file), tolerances, reference_changes(run, file, scenario.parent)
-            )
+            spec = load_scenario(scenario).spec.reference
+            if spec is None:
+                raise InputError(f'{scenario} has no "reference"')
+            file, run = scenario.parent / spec.file, _read_result(result)
+            tolerances = {name: Tolerance(**vars(part)) for name, part in spec.tolerances.items()}
+            changes = reference_changes(run, file, scenario.parent)
+            return cls(run, _read_result(file), tolerances, changes)
         return cls(
             _read_result(result),
             _read_result(reference),
@@ -161,11 +163,9 @@ def reference_changes(result: Result, reference: Path, folder: Path) -> str:
 
         Metadata name it from the scenario's folder.
         """
-        return (
-            name
-            if name.startswith(SHIPPED)
-            else os.path.relpath(folder / name).replace(os.sep, "/")
-        )
+        if name.startswith(SHIPPED):
+            return name
+        return os.path.relpath(folder / name).replace(os.sep, "/")
 
     try:
         made_by = parse_object(reference.with_suffix(".json").read_text(encoding="utf-8"))
@@ -173,11 +173,8 @@ def reference_changes(result: Result, reference: Path, folder: Path) -> str:
         return ""
     changes = describe_provenance_changes(made_by, result.metadata, shown)
     own_first = sorted(changes, key=lambda change: change.startswith(SHIPPED))
-    return (
-        f"changed since the reference was made: {abbreviate_names(own_first, MAX_LISTED_CHANGES)}"
-        if changes
-        else ""
-    )
+    listed = abbreviate_names(own_first, MAX_LISTED_CHANGES)
+    return f"changed since the reference was made: {listed}" if changes else ""
 
 
 def _read_result(source: ResultSource) -> Result:
@@ -200,13 +197,3 @@ def is_scenario(path: Path) -> bool:
     return path.suffix == ".json" or (
         path.name == str(path) and not path.suffix and not path.exists()
     )
-
-
-def _scenario_reference(path: Path) -> tuple[Path, Mapping[str, Tolerance]]:
-    """Return the path of a scenario's reference, and its tolerances."""
-    spec = load_scenario(path).spec.reference
-    if spec is None:
-        raise InputError(f'{path} has no "reference"')
-    return path.parent / spec.file, {
-        name: Tolerance(**vars(part)) for name, part in spec.tolerances.items()
-    }

@@ -111,15 +111,11 @@ def simulate(
                 "name": Path(fmu).stem,
                 "non_finite": warn_non_finite(run.recording),
                 "macro_steps": run.macro_steps,
+                "terminated_by": None,
             }
-            ended = (
-                {"component": run.termination.component, "time": run.termination.time}
-                if run.termination
-                else None
-            )
-            result = Result(
-                run.recording, timing=dict(run.timing), metadata={**about, "terminated_by": ended}
-            )
+            if ended := run.termination:
+                about["terminated_by"] = {"component": ended.component, "time": ended.time}
+            result = Result(run.recording, timing=dict(run.timing), metadata=about)
             if run.failure:
                 raise run.failure
     except (ComponentError, KeyboardInterrupt) as error:
@@ -253,30 +249,23 @@ def _column_names(values: Any) -> list[str]:
 def _table_of_columns(values: Any, targets: Mapping[str, Variable]) -> InputTable:
     try:
         time = np.array(values["time"], np.float64)
-        table = {name: _column_values(values[name], variable) for name, variable in targets.items()}
+        table: dict[str, list[Any]] = {}
+        for name, variable in targets.items():
+            column = values[name]
+            table[name] = [
+                # a text, as in CSV, is accepted for each type
+                each if isinstance(each, bytes) else parse_cell(str(each), variable)
+                for each in (column.tolist() if hasattr(column, "tolist") else list(column))
+            ]
     except (TypeError, ValueError) as error:
         raise InputError(Problem(f"expected numbers: {error}", "input")) from None
     sizes_agree = (
         time.ndim == 1 and len(time) and all(len(each) == len(time) for each in table.values())
     )
     if not sizes_agree or not np.isfinite(time).all() or (np.diff(time) <= 0).any():
-        raise InputError(
-            Problem(
-                "expected columns of equal length with finite numbers, and increasing time", "input"
-            )
-        )
+        text = "expected columns of equal length with finite numbers, and increasing time"
+        raise InputError(Problem(text, "input"))
     return make_input_table(time.tolist(), table, targets, "linear")
-
-
-def _column_values(values: Any, variable: Variable) -> list[Any]:
-    """Return the values of one column in the type of the input.
-
-    A text, as in CSV, is accepted for each type.
-    """
-    column = values.tolist() if hasattr(values, "tolist") else list(values)
-    return [
-        value if isinstance(value, bytes) else parse_cell(str(value), variable) for value in column
-    ]
 
 
 def _check_start_values(component: Component, start_values: Mapping[str, Any]) -> dict[str, Any]:

@@ -20,67 +20,46 @@ from ..core import __version__
 from ..core.errors import CosimError, did_you_mean
 from ..process.standard_streams import open_closed_streams, protected_stream
 
-#: module in `commands`, ":" and its function unless that is `command`, and the description
+#: descriptions of the commands
 COMMANDS = {
-    "run": ("run", "Run a scenario and write results, figures and a report."),
-    "check": (
-        "check",
-        "Check a scenario without running it and print the expanded system.",
-    ),
-    "recover": (
-        "recover",
-        "Write the results of a run that could not be written when it ended.",
-    ),
-    "simulate": ("simulate", "Simulate a single FMU."),
-    "compare": ("regress:compare", "Compare a result with a reference, signal by signal."),
+    "run": "Run a scenario and write results, figures and a report.",
+    "check": "Check a scenario without running it and print the expanded system.",
+    "recover": "Write the results of a run that could not be written when it ended.",
+    "simulate": "Simulate a single FMU.",
+    "compare": "Compare a result with a reference, signal by signal.",
     "regress": (
-        "regress:regress",
-        "Run all scenarios that have checks or a reference, and compare their results with these.",
+        "Run all scenarios that have checks or a reference, and compare their results with these."
     ),
-    "bench-controller": (
-        "bench_controller",
-        "Benchmark a controller in every scenario with its role.",
-    ),
-    "sweep": (
-        "sweep",
-        "Run a scenario at many points: parameter studies and Monte Carlo.",
-    ),
-    "tune": ("tune", "Find the parameters that minimise a KPI."),
-    "trim": ("analysis:trim", "Find values with which a scenario starts in equilibrium."),
-    "linearize": (
-        "analysis:linearize",
-        "Linearise a scenario, or some of its components, at a point in time.",
-    ),
-    "margins": (
-        "analysis:margins",
-        "Print the stability margins at the inputs and outputs of a controller.",
-    ),
-    "plot": ("finished_runs:plot", "Draw the figures of finished runs again."),
-    "report": ("finished_runs:report", "Write the report of a finished run again."),
-    "replay": (
-        "finished_runs:replay",
-        "Write a page with the 3-D replay of one run, or of two runs to compare.",
-    ),
-    "info": ("info", "Print the properties and variables of an FMU."),
-    "validate": (
-        "validate",
-        "Validate FMUs against the FMI standard without running them.",
-    ),
-    "build": ("build", "Export controllers and plants to fmus/."),
-    "init": (
-        "init",
-        "Create a project with a controller, a scenario, its reference, tests and CI.",
-    ),
-    "new": ("new", "Create a controller, a scenario, or a vehicle."),
-    "list": (
-        "list:list_shipped",
-        "List the shipped scenarios, sweeps, vehicle models, roles of controllers and KPIs.",
-    ),
-    "schema": ("list:schema", "Print the JSON Schema of scenarios, sweeps or tunings."),
-    "doctor": (
-        "doctor",
-        "Print which packages, tools and sandboxes are available on this machine.",
-    ),
+    "bench-controller": "Benchmark a controller in every scenario with its role.",
+    "sweep": "Run a scenario at many points: parameter studies and Monte Carlo.",
+    "tune": "Find the parameters that minimise a KPI.",
+    "trim": "Find values with which a scenario starts in equilibrium.",
+    "linearize": "Linearise a scenario, or some of its components, at a point in time.",
+    "margins": "Print the stability margins at the inputs and outputs of a controller.",
+    "plot": "Draw the figures of finished runs again.",
+    "report": "Write the report of a finished run again.",
+    "replay": "Write a page with the 3-D replay of one run, or of two runs to compare.",
+    "info": "Print the properties and variables of an FMU.",
+    "validate": "Validate FMUs against the FMI standard without running them.",
+    "build": "Export controllers and plants to fmus/.",
+    "init": "Create a project with a controller, a scenario, its reference, tests and CI.",
+    "new": "Create a controller, a scenario, or a vehicle.",
+    "list": "List the shipped scenarios, sweeps, vehicle models, roles of controllers and KPIs.",
+    "schema": "Print the JSON Schema of scenarios, sweeps or tunings.",
+    "doctor": "Print which packages, tools and sandboxes are available on this machine.",
+}
+#: module in `commands`, ":" and function of the commands that have no module of their own
+_FUNCTIONS = {
+    "compare": "regress:compare",
+    "regress": "regress:regress",
+    "trim": "analysis:trim",
+    "linearize": "analysis:linearize",
+    "margins": "analysis:margins",
+    "plot": "finished_runs:plot",
+    "report": "finished_runs:report",
+    "replay": "finished_runs:replay",
+    "list": "list:list_shipped",
+    "schema": "list:schema",
 }
 
 
@@ -99,9 +78,10 @@ class _LazyGroup(click.Group):
         """Import the command called `name`; None if there is none."""
         if name not in COMMANDS:
             return None
-        module, _, function = COMMANDS[name][0].partition(":")
+        default = f"{name.replace('-', '_')}:command"
+        module, _, function = _FUNCTIONS.get(name, default).partition(":")
         imported = import_module(f".commands.{module}", __name__)
-        command: click.Command = getattr(imported, function or "command")
+        command: click.Command = getattr(imported, function)
         import_module(".options", __name__).add_verbosity_options(command)
         return command
 
@@ -119,7 +99,7 @@ class _LazyGroup(click.Group):
     def format_commands(self, _ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of commands without importing them."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
+            formatter.write_dl(list(COMMANDS.items()))
 
 
 @dataclass

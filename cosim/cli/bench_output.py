@@ -28,29 +28,20 @@ if TYPE_CHECKING:
 OWN_CONTROLLER = "scenario's own"
 
 
-class BenchProgress:
-    """Headings of the controllers of a benchmark, with the time that the others probably take.
+def print_heading(name: str, finished: int, count: int, began: float) -> None:
+    """Print the name of the controller that runs next, and the time that is probably left.
 
     Args:
-        count: number of controllers.
-        quiet: print nothing.
+        name: name of the controller.
+        finished: number of controllers before it.
+        count: number of all controllers.
+        began: `time.perf_counter()` before the first one (s).
     """
-
-    def __init__(self, count: int, quiet: bool) -> None:
-        self._count, self._quiet = count, quiet
-        self._finished = -1
-        self._began = time.perf_counter()
-
-    def print_next(self, name: str) -> None:
-        """Print the number and the name of the controller that runs next."""
-        self._finished += 1
-        rest = ""
-        if self._finished:
-            per_controller = (time.perf_counter() - self._began) / self._finished
-            seconds = per_controller * (self._count - self._finished)
-            rest = f", about {format_duration(seconds)} left"
-        if not self._quiet:
-            click.echo(f"{name} (controller {self._finished + 1} of {self._count}{rest})")
+    rest = ""
+    if finished:
+        seconds = (time.perf_counter() - began) / finished * (count - finished)
+        rest = f", about {format_duration(seconds)} left"
+    click.echo(f"{name} (controller {finished + 1} of {count}{rest})")
 
 
 def print_trial(result: TrialResult, candidate: str) -> None:

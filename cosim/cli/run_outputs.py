@@ -187,7 +187,7 @@ def save_after_crash(outcome: SupervisedOutcome, options: RunOptions) -> None:
 
     The report is written by another supervised process, because it calls functions of the user.
     """
-    from ..process.run_files import read_metadata
+    from ..process.run_files import read_metadata, recover_recording
     from ..results import Result, RunMetadata
     from ..results.checks import warn_non_finite
 
@@ -199,7 +199,7 @@ def save_after_crash(outcome: SupervisedOutcome, options: RunOptions) -> None:
             "macro_steps": outcome.journal[STEP_COUNT],
             "failure": failure,
         }
-        recording = supervision.recover_outcome_recording(outcome)
+        recording = recover_recording(folder, outcome.row_count)
         if metadata.get("scenario", {}).get("non_finite") != "allow":
             print_log()
             metadata["non_finite"] = warn_non_finite(recording)

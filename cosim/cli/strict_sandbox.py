@@ -95,7 +95,14 @@ def rerun_in_bubblewrap(files: Iterable[Path], output: Path | None) -> int:
         named += [file.absolute().parent, file.resolve().parent]
     folders = [folder for folder in named if folder.exists()]
     outputs = [output] if output else []
-    _refuse_home_folder([*folders, *outputs])
+    home = Path.home().resolve()
+    for folder in (*folders, *outputs):
+        if home.is_relative_to(folder.resolve()):
+            raise InputError(
+                f'--sandbox strict: "{folder}" holds a file or the results of this run, but '
+                "contains the home folder, all of which would be visible inside; expected a "
+                "folder of the project"
+            )
     with ExitStack() as stack:
         temporary = Path(stack.enter_context(temporary_run_folder()))
         stack.enter_context(interrupt_on_termination())
@@ -127,19 +134,6 @@ def rerun_in_bubblewrap(files: Iterable[Path], output: Path | None) -> int:
     if "exit-code" not in report:
         raise InputError(f"bubblewrap could not start the command (exit code {process.returncode})")
     return int(report["exit-code"])
-
-
-def _refuse_home_folder(folders: Iterable[Path]) -> None:
-    """Raise InputError if one of the folders is the home folder or contains it."""
-    from ..core.errors import InputError
-
-    home = Path.home().resolve()
-    if found := next((folder for folder in folders if home.is_relative_to(folder.resolve())), None):
-        raise InputError(
-            f'--sandbox strict: "{found}" holds a file or the results of this run, but contains '
-            "the home folder, "
-            f"all of which would be visible inside; expected a folder of the project"
-        )
 
 
 @contextmanager

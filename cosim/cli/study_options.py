@@ -166,7 +166,15 @@ def show_progress(total: int) -> Iterator[Callable[[str, int], object]]:
         yield lambda _text, _done: None
         return
     if not sys.stderr.isatty():
-        yield _ProgressLines()
+        shown = time.monotonic()
+
+        def print_text(text: str, _done: int) -> None:
+            nonlocal shown
+            if time.monotonic() - shown > _LINE_INTERVAL:
+                shown = time.monotonic()
+                click.echo(text, err=True)
+
+        yield print_text
         return
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn
@@ -182,15 +190,3 @@ def show_progress(total: int) -> Iterator[Callable[[str, int], object]]:
     ) as bar:
         task = bar.add_task("", total=total)
         yield lambda text, done: bar.update(task, completed=done, description=text)
-
-
-class _ProgressLines:
-    """Printer of progress that prints a line at most every 30 s."""
-
-    def __init__(self) -> None:
-        self._last = time.monotonic()
-
-    def __call__(self, text: str, _done: int) -> None:
-        if time.monotonic() - self._last > _LINE_INTERVAL:
-            self._last = time.monotonic()
-            click.echo(text, err=True)

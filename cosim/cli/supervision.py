@@ -15,7 +15,6 @@ from .options import options
 from .strict_sandbox import SANDBOX_KINDS
 
 if TYPE_CHECKING:
-    from ..core.recording import Recording
     from ..process.journal import Journal
     from ..process.supervisor import SupervisedOutcome
 
@@ -100,10 +99,3 @@ def results_written(code: int) -> int:
         journal[EXIT_CODE] = code
         journal.enter_phase(Phase.RESULTS_WRITTEN)
     return code
-
-
-def recover_outcome_recording(outcome: SupervisedOutcome) -> Recording:
-    """Return the rows that a crashed or interrupted child recorded."""
-    from ..process.run_files import recover_recording
-
-    return recover_recording(outcome.journal.folder, outcome.row_count)

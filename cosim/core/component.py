@@ -41,17 +41,9 @@ Causality = Literal[
 ]
 Variability = Literal["constant", "fixed", "tunable", "discrete", "continuous"]
 
+_NUMBER_TYPES = "Float64 Float32 Int8 UInt8 Int16 UInt16 Int32 UInt32 Int64 UInt64"
 DTYPES: Mapping[str, np.dtype[Any]] = {
-    "Float64": np.dtype(np.float64),
-    "Float32": np.dtype(np.float32),
-    "Int8": np.dtype(np.int8),
-    "UInt8": np.dtype(np.uint8),
-    "Int16": np.dtype(np.int16),
-    "UInt16": np.dtype(np.uint16),
-    "Int32": np.dtype(np.int32),
-    "UInt32": np.dtype(np.uint32),
-    "Int64": np.dtype(np.int64),
-    "UInt64": np.dtype(np.uint64),
+    **{name: np.dtype(name.lower()) for name in _NUMBER_TYPES.split()},
     "Boolean": np.dtype(np.bool_),
     "Enumeration": np.dtype(np.int64),
     "String": np.dtype(object),

@@ -200,15 +200,11 @@ def merge_problems(problems: Iterable[Problem], beginning: str) -> list[Problem]
     for each in dict.fromkeys(problems):
         place = each.where.partition(":")[0] if each.message.startswith(beginning) else each.where
         groups.setdefault((each.message, place), []).append(each)
-    return [_with_count(group[0], len(group)) for group in groups.values()]
-
-
-def _with_count(problem: Problem, count: int) -> Problem:
-    if count == 1:
-        return problem
-    return replace(
-        problem, message=f"{problem.message}; {count_noun(count - 1, 'more place')} likewise"
-    )
+    merged = []
+    for first, *others in groups.values():
+        more = f"; {count_noun(len(others), 'more place')} likewise" if others else ""
+        merged.append(replace(first, message=first.message + more))
+    return merged
 
 
 def did_you_mean(name: str, valid: Iterable[str]) -> str:

@@ -179,7 +179,13 @@ def check_node(node: ast.AST, conditions: bool = False) -> None:
         ):
             operands = left, *right_sides
         case ast.Call(func=ast.Name(id=name), args=[_, *_] as arguments, keywords=[]):
-            _check_call(name, arguments, conditions)
+            if name not in FUNCTIONS:
+                raise ValueError(f'unknown function "{name}"{near_or_valid_names(name, FUNCTIONS)}')
+            for argument in arguments:
+                check_node(argument, conditions)
+            if len(arguments) not in FUNCTIONS[name].counts:
+                expected = FUNCTIONS[name].expected
+                raise ValueError(f'"{name}" takes {expected}, found {len(arguments)}')
             operands = ()
         case _ if spelt_name(node):
             operands = ()
@@ -189,15 +195,6 @@ def check_node(node: ast.AST, conditions: bool = False) -> None:
             raise ValueError(f'"{ast.unparse(node)}" is not allowed here; expected {hint}')
     for part in operands:
         check_node(part, conditions)
-
-
-def _check_call(name: str, arguments: Sequence[ast.AST], conditions: bool) -> None:
-    if name not in FUNCTIONS:
-        raise ValueError(f'unknown function "{name}"{near_or_valid_names(name, FUNCTIONS)}')
-    for argument in arguments:
-        check_node(argument, conditions)
-    if len(arguments) not in FUNCTIONS[name].counts:
-        raise ValueError(f'"{name}" takes {FUNCTIONS[name].expected}, found {len(arguments)}')
 
 
 def spelt_name(node: ast.AST) -> str:

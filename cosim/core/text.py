@@ -72,8 +72,9 @@ def escape_control_characters(text: str, keep: str = "") -> str:
     """
     if text.isprintable():
         return text
-    return "".join(c if c.isprintable() or c in keep else _escape(c) for c in text)
-
-
-def _escape(character: str) -> str:
-    return character.encode("unicode_escape", "surrogatepass").decode("ascii")
+    escaped = ""
+    for c in text:
+        if not (c.isprintable() or c in keep):
+            c = c.encode("unicode_escape", "surrogatepass").decode("ascii")
+        escaped += c
+    return escaped

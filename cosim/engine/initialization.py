@@ -126,10 +126,6 @@ class InitialValues:
         self._held = {}
         self._sweep(TOLERANCE)
 
-    @property
-    def _sweeps(self) -> int:
-        return len(self._components) + 1 + EXTRA_SWEEPS
-
     def _require_settled(self, changing: Sequence[Endpoint]) -> None:
         if changing:
             raise self._failure(
@@ -144,7 +140,7 @@ class InitialValues:
         """
         changing: list[Endpoint] = []
         largest: list[float] = []
-        for number in range(self._sweeps):
+        for number in range(len(self._components) + 1 + EXTRA_SWEEPS):
             self._largest_change = 0.0
             changing = self._sweep(TOLERANCE if number > len(self._components) else 0.0)
             before = largest[-len({end.component for end in changing}) :][:1]

@@ -14,7 +14,7 @@ converge too. A step that does not reduce the residuals is halved (damped Newton
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from itertools import compress
 from typing import Any, NamedTuple
@@ -92,9 +92,15 @@ class FixedPointIteration:
                 nonlocal is_first
                 if not is_first:
                     discard_requests()
-                    self._restore_states(states, time)
+                    for name, state in states.items():
+                        with calling_component(name, "set_state", "step", time):
+                            self._components[name].set_state(state)
                 before = self._output_values()
-                self._iterate_once(is_first)
+                for transfers, delayed_transfers, steps in self._phases:
+                    for transfer in (*transfers, *delayed_transfers) if is_first else transfers:
+                        transfer()
+                    for step in steps:
+                        self._run_step(step)
                 is_first = False
                 return [
                     self._changed(old, new)
@@ -156,18 +162,6 @@ class FixedPointIteration:
 
         stack.callback(free)
         return state
-
-    def _restore_states(self, states: Mapping[str, Any], time: float) -> None:
-        for name, state in states.items():
-            with calling_component(name, "set_state", "step", time):
-                self._components[name].set_state(state)
-
-    def _iterate_once(self, first: bool) -> None:
-        for transfers, delayed_transfers, steps in self._phases:
-            for transfer in (*transfers, *delayed_transfers) if first else transfers:
-                transfer()
-            for step in steps:
-                self._run_step(step)
 
     def _output_values(self) -> list[np.ndarray]:
         return [array[offsets] for array, offsets in self._coupled_outputs]

@@ -97,8 +97,13 @@ def _allocate(lengths: Mapping[Dtype, int]) -> tuple[np.ndarray, dict[Dtype, np.
     numeric = sorted(
         (dtype for dtype in lengths if not dtype.hasobject), key=lambda dtype: -dtype.itemsize
     )
-    sizes = {dtype: _round_up(lengths[dtype] * dtype.itemsize) for dtype in numeric}
-    buffer = _allocate_aligned(sum(sizes.values()))
+    sizes = {
+        dtype: -(-lengths[dtype] * dtype.itemsize // ALIGNMENT) * ALIGNMENT for dtype in numeric
+    }
+    size = sum(sizes.values())
+    memory = np.zeros(size + ALIGNMENT, np.uint8)
+    first = -memory.ctypes.data % ALIGNMENT
+    buffer = memory[first : first + size]
     arrays, begin = {}, 0
     for dtype in numeric:
         arrays[dtype] = buffer[begin : begin + lengths[dtype] * dtype.itemsize].view(dtype)
@@ -107,13 +112,3 @@ def _allocate(lengths: Mapping[Dtype, int]) -> tuple[np.ndarray, dict[Dtype, np.
         dtype: np.full(length, "", dtype) for dtype, length in lengths.items() if dtype.hasobject
     }
     return buffer, arrays | objects
-
-
-def _allocate_aligned(size: int) -> np.ndarray:
-    buffer = np.zeros(size + ALIGNMENT, np.uint8)
-    begin = -buffer.ctypes.data % ALIGNMENT
-    return buffer[begin : begin + size]
-
-
-def _round_up(size: int) -> int:
-    return -(-size // ALIGNMENT) * ALIGNMENT

@@ -12,7 +12,6 @@ from ..core.component import NativeDoStep, NativeFlagCheck, NativeGetSet, Prepar
 from ..core.errors import InputError
 from ..process.journal import ROW_COUNT
 from .executor import Executor
-from .plan import ScheduledStep
 from .transfer_plan import Transfer, contiguous_views
 
 try:
@@ -60,7 +59,10 @@ class NativeExecutor(Executor):
             for transfer in phase.transfers:
                 self._add_transfer(transfer)
             for step in steps:
-                self._add_step(step)
+                self._program.begin_step(step.step.divisor)
+                for number, call in enumerate(step.calls, start=step.first_call):
+                    self._add_call(number, call)
+                self._program.end_step()
         by_item_size = {
             array.dtype.itemsize: array for array in self._finite_check.monitored_floats
         }
@@ -89,7 +91,10 @@ class NativeExecutor(Executor):
 
     def _add_transfer(self, transfer: Transfer) -> None:
         if transfer.source.dtype.hasobject:
-            self._add_object_transfer(self._transfer_call(transfer))
+            self._program.begin_step(1)
+            call = self._transfer_call(transfer)
+            self._program.add_python_call(-1, _call_and_return_ok, (call,))
+            self._program.end_step()
             return
         views = contiguous_views(transfer)
         if views and len(transfer.target_indices) >= MIN_BLOCK_VALUES * len(views):
@@ -119,17 +124,6 @@ class NativeExecutor(Executor):
             transfer.interpolates,
             self._delay_lines[transfer].step_size if transfer.delay else 0.0,
         )
-
-    def _add_object_transfer(self, transfer_call: Callable[[], object]) -> None:
-        self._program.begin_step(1)
-        self._program.add_python_call(-1, _call_and_return_ok, (transfer_call,))
-        self._program.end_step()
-
-    def _add_step(self, step: ScheduledStep) -> None:
-        self._program.begin_step(step.step.divisor)
-        for number, call in enumerate(step.calls, start=step.first_call):
-            self._add_call(number, call)
-        self._program.end_step()
 
     def _add_call(self, number: int, call: PreparedCall) -> None:
         program, native = self._program, call.native
@@ -166,7 +160,8 @@ class NativeExecutor(Executor):
 
     def _run_macro_steps(self, first: int, end: int) -> None:
         grid = self.plan.grid
-        end = min(end, first + self._steps_per_call(first))
+        measured = first >= self._program_start + _native.MEASURED_STEPS
+        end = min(end, first + (MAX_STEPS_PER_CALL if measured else _native.MEASURED_STEPS))
         coefficients = grid.coefficients(end)
         if coefficients is None:
             end, coefficients = first + 1, (grid.time_at(first + 1), 0.0, 1.0)
@@ -179,14 +174,6 @@ class NativeExecutor(Executor):
         recorder = self.recorder
         by_python = recorder.has_strings
         self._program.set_rows(*((0, 1) if by_python else (recorder.next_row, recorder.free_rows)))
-
-    def _steps_per_call(self, first: int) -> int:
-        """Return the largest number of macro steps in one call.
-
-        The first call is short and measures the durations of steps.
-        """
-        measured = first >= self._program_start + _native.MEASURED_STEPS
-        return MAX_STEPS_PER_CALL if measured else _native.MEASURED_STEPS
 
     def _step_durations(self) -> dict[int, float]:
         durations = self._program.step_durations()

@@ -59,7 +59,8 @@ class Pacer:
         ahead = due - time.monotonic_ns()
         self._lateness.append(max(0, -ahead))
         if ahead > 0:
-            _sleep_until(due)
+            while (ahead := due - time.monotonic_ns()) > 0:
+                time.sleep(min(ahead, _LONGEST_SLEEP) * 1e-9)
         elif -ahead * self._denominator > self._numerator:
             self._report_lateness(n, -ahead * 1e-9)
 
@@ -93,12 +94,6 @@ class Pacer:
             "mean_lateness": float(lateness.mean()),
             "lateness_99_percent": float(np.percentile(lateness, 99)),
         }
-
-
-def _sleep_until(due: int) -> None:
-    """Wait until a time of the monotonic clock (ns)."""
-    while (ahead := due - time.monotonic_ns()) > 0:
-        time.sleep(min(ahead, _LONGEST_SLEEP) * 1e-9)
 
 
 class Stopwatch:

@@ -8,7 +8,7 @@ for each other's interpreter lock.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
@@ -187,15 +187,14 @@ class StepFailure(NamedTuple):
 def run_due(steps: Sequence[ScheduledStep], n: int) -> list[StepFailure]:
     """Run the steps that are due in macro step `n`, in order; return those that stopped early."""
     due = (step for step in steps if n % step.step.divisor == 0)
-    return list(chain.from_iterable(map(_run_calls, due)))
-
-
-def _run_calls(step: ScheduledStep) -> Iterator[StepFailure]:
-    for index, call in enumerate(step.calls):
-        status = call.function(*call.arguments)
-        if status not in SUCCESS_STATUSES:
-            yield StepFailure(step, index, status)
-            break
-    if float_mode.is_changed() or float_mode.enabled_traps():
-        float_mode.set_default()
-        yield StepFailure(step, -1, None)
+    failures = []
+    for step in due:
+        for index, call in enumerate(step.calls):
+            status = call.function(*call.arguments)
+            if status not in SUCCESS_STATUSES:
+                failures.append(StepFailure(step, index, status))
+                break
+        if float_mode.is_changed() or float_mode.enabled_traps():
+            float_mode.set_default()
+            failures.append(StepFailure(step, -1, None))
+    return failures

@@ -160,20 +160,33 @@ def compile_plan(system: System, settings: Settings) -> Plan:
             reasons, see `check_run`.
     """
     grid = check_run(system, settings)
-    phases = list(_split_into_phases(system))
+    incoming: dict[str, list[Connection]] = defaultdict(list)
+    for connection in system.connections:
+        incoming[connection.target.component].append(connection)
+    inside = frozenset(system.components)
+    phases = list(_phases_of_stages(system.stages, system.parallel, inside, incoming))
     connections = list(chain.from_iterable(map(_connections_of, phases)))
-    inputs = _input_layout(system, connections)
-    outputs = _output_layout(
-        system, connections, settings.columns.values(), _extrapolated_sources(system, phases, set())
-    )
+    # inputs in the order of transfers, so that the targets of each are consecutive; outputs in the
+    # order of their first use
+    targets = [connection.target for connection in connections]
+    terms = [Variable(term_endpoint(c).scalar) for c in connections if c.term]
+    linear = [c.target for c in connections if c.interpolation == "linear"]
+    inputs = _layout_of_endpoints(system, targets, "input", terms, linear)
+    sources = [*(connection.source for connection in connections), *settings.columns.values()]
+    sloped = _extrapolated_sources(system, phases, set())
+    outputs = _layout_of_endpoints(system, sources, "output", (), sloped)
     planner = TransferPlanner(system, inputs, outputs, float(grid.step))
     stepped: set[str] = set()
 
     def make_phase(draft: _PhaseDraft) -> Phase:
-        steps = tuple(_make_step(system, grid, name) for name in draft.names)
+        steps = []
+        for name in draft.names:
+            divisor = int(system.periods.get(name, grid.step) / grid.step)
+            step_size = float(grid.step * divisor)
+            steps.append(Step(name, system.components[name], divisor, step_size))
         transfers = tuple(planner.plan_transfers(draft.connections, stepped))
         stepped.update(draft.names)
-        return Phase(transfers, steps, draft.parallel, make_loop(draft.group, draft.inner))
+        return Phase(transfers, tuple(steps), draft.parallel, make_loop(draft.group, draft.inner))
 
     def make_loop(group: Group | None, inner: Sequence[_PhaseDraft]) -> Loop | None:
         if not group or not group.iteration:
@@ -183,17 +196,12 @@ def compile_plan(system: System, settings: Settings) -> Plan:
         return Loop(group.name, group.iteration, tuple(map(make_phase, inner)), connections)
 
     record_every = int((settings.record_interval or grid.step) / grid.step)
-    events = _events_by_point(settings.events, grid)
+    events: dict[int, list[Event]] = defaultdict(list)
+    for event in settings.events:
+        events[grid.index(event.time)].append(event)
     return Plan(
         system, settings, grid, record_every, events, inputs, outputs, list(map(make_phase, phases))
     )
-
-
-def _events_by_point(events: Iterable[Event], grid: TimeGrid) -> dict[int, list[Event]]:
-    points: dict[int, list[Event]] = defaultdict(list)
-    for event in events:
-        points[grid.index(event.time)].append(event)
-    return points
 
 
 def all_steps(phases: Iterable[Phase]) -> Iterator[Step]:
@@ -213,11 +221,6 @@ def _flatten_phases(phases: Iterable[Phase]) -> Iterator[Phase]:
             yield from _flatten_phases(phase.loop.phases)
 
 
-def _make_step(system: System, grid: TimeGrid, name: str) -> Step:
-    divisor = int(system.periods.get(name, grid.step) / grid.step)
-    return Step(name, system.components[name], divisor, float(grid.step * divisor))
-
-
 class _PhaseDraft(NamedTuple):
     """A phase before its transfers are planned.
 
@@ -235,16 +238,6 @@ def _connections_of(phase: _PhaseDraft) -> Iterator[Connection]:
     yield from phase.connections
     for inner in phase.inner:
         yield from _connections_of(inner)
-
-
-def _split_into_phases(system: System) -> Iterator[_PhaseDraft]:
-    """Yield the phases of the system, in order."""
-    incoming: dict[str, list[Connection]] = defaultdict(list)
-    for connection in system.connections:
-        incoming[connection.target.component].append(connection)
-    yield from _phases_of_stages(
-        system.stages, system.parallel, frozenset(system.components), incoming
-    )
 
 
 def _phases_of_stages(
@@ -285,20 +278,6 @@ def _phases_of_stages(
                 yield from inner
 
 
-def _input_layout(system: System, connections: Iterable[Connection]) -> Layout:
-    """Lay out the inputs in the order of transfers, so that the targets of each are consecutive."""
-    connections = list(connections)
-    terms = [
-        Variable(term_endpoint(connection).scalar) for connection in connections if connection.term
-    ]
-    linear = [
-        connection.target for connection in connections if connection.interpolation == "linear"
-    ]
-    return _layout_of_endpoints(
-        system, (connection.target for connection in connections), "input", terms, linear
-    )
-
-
 def _extrapolated_sources(
     system: System, phases: Iterable[_PhaseDraft], stepped: set[str]
 ) -> Iterator[Endpoint]:
@@ -314,31 +293,12 @@ def _extrapolated_sources(
         yield from _extrapolated_sources(system, phase.inner, stepped)
 
 
-def _output_layout(
-    system: System,
-    connections: Iterable[Connection],
-    recorded: Iterable[Endpoint],
-    sloped: Iterable[Endpoint],
-) -> Layout:
-    """Lay out the connected and recorded outputs in the order of their first use.
-
-    With the slopes of some of them.
-    """
-    return _layout_of_endpoints(
-        system,
-        (*(connection.source for connection in connections), *recorded),
-        "output",
-        (),
-        sloped,
-    )
-
-
 def _layout_of_endpoints(
     system: System,
     endpoints: Iterable[Endpoint],
     causality: Causality,
-    terms: Sequence[Variable] = (),
-    sloped: Iterable[Endpoint] = (),
+    terms: Sequence[Variable],
+    sloped: Iterable[Endpoint],
 ) -> Layout:
     used: dict[str, dict[str, Variable]] = {name: {} for name in component_names(system.stages)}
     for endpoint in endpoints:
@@ -359,19 +319,16 @@ def _layout_of_endpoints(
 def _variables_to_bind(
     component: Component, used: Mapping[str, Variable], causality: Causality
 ) -> Sequence[Variable]:
-    if not component.binds_everything:
-        return _group_by_type(list(used.values()))
-    own = [variable for variable in component.variables if variable.causality == causality]
-    return [*own, *(variable for variable in used.values() if variable.causality != causality)]
+    """Return the variables that are used, or all of the causality and the others that are used.
 
-
-def _group_by_type(variables: Sequence[Variable]) -> list[Variable]:
-    """Group variables by type, so that one FMI call sets or gets all of a type.
-
+    Used variables are grouped by type, so that one FMI call sets or gets all of a type.
     Enumerations count as integers.
     """
+    if component.binds_everything:
+        own = [variable for variable in component.variables if variable.causality == causality]
+        return [*own, *(variable for variable in used.values() if variable.causality != causality)]
     groups: dict[str, list[Variable]] = defaultdict(list)
-    for variable in variables:
+    for variable in used.values():
         is_enumeration = variable.type == "Enumeration"
         kind = f"Int{8 * variable.dtype.itemsize}" if is_enumeration else variable.type
         groups[kind].append(variable)

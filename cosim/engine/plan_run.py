@@ -19,7 +19,7 @@ import numpy as np
 
 from ..core import component_log
 from ..core.component import Component
-from ..core.errors import ComponentError, InputError, Problem, join_alternatives
+from ..core.errors import ComponentError, InputError, join_alternatives
 from ..core.recording import Recording
 from ..core.system import System
 from ..process.float_mode import default_float_mode, is_default
@@ -105,8 +105,16 @@ class PlanRun:
         """
         self._components, settings = plan.system.components, plan.settings
         try:
-            self._journal = _claim_journal()
-            if problems := _space_problems(plan, self._journal):
+            journal = current_journal()
+            # a later run of this process, such as that of a KPI that simulates, has no journal
+            self._journal = journal = journal if journal and journal.claim() else None
+            rows_file = settings.rows_file
+            folder = (journal and journal.folder) or (rows_file and rows_file.parent)
+            if problems := find_space_problems(
+                plan,
+                folder or Path(tempfile.gettempdir()),
+                csv=bool(journal and journal.writes_csv),
+            ):
                 raise InputError(problems)
             self.executor = _create_executor(plan, executor, self._journal)
         except BaseException:
@@ -328,20 +336,14 @@ class PlanRun:
                     if not self.failure:
                         self._states.free_all()
                 finally:
-                    _end_components(
-                        self._components, terminate=self._is_initialized and not self.failure
-                    )
+                    try:
+                        if self._is_initialized and not self.failure:
+                            for name, component in self._components.items():
+                                _call_or_warn(name, "terminate", component.terminate)
+                    finally:
+                        free_components(self._components)
         finally:
             report_forks()
-
-
-def _end_components(components: Mapping[str, Component], terminate: bool) -> None:
-    """Free all components; call `terminate` of all of them first if requested."""
-    try:
-        for name, component in components.items() if terminate else ():
-            _call_or_warn(name, "terminate", component.terminate)
-    finally:
-        free_components(components)
 
 
 def free_components(components: Mapping[str, Component]) -> None:
@@ -367,23 +369,6 @@ def _call_or_warn(component: str, name: str, function: Callable[[], None]) -> No
         component_log.log_message(
             component, component_log.WARNING, f"{error.function} failed: {error.reason}"
         )
-
-
-def _claim_journal() -> Journal | None:
-    """Return the journal of this process for its first run.
-
-    None for a later one, such as that of a KPI that simulates.
-    """
-    journal = current_journal()
-    return journal if journal and journal.claim() else None
-
-
-def _space_problems(plan: Plan, journal: Journal | None) -> list[Problem]:
-    settings = plan.settings
-    rows = (journal and journal.folder) or (settings.rows_file and settings.rows_file.parent)
-    return find_space_problems(
-        plan, rows or Path(tempfile.gettempdir()), csv=bool(journal and journal.writes_csv)
-    )
 
 
 def _create_executor(

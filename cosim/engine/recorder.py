@@ -69,7 +69,9 @@ class Recorder:
             name: plan.outputs.positions[endpoint] for name, endpoint in columns.items()
         }
         numeric = sorted(
-            {p for p in self._positions.values() if not p.dtype.hasobject}, key=_alignment_order
+            {p for p in self._positions.values() if not p.dtype.hasobject},
+            # largest item size first, so that every value of a packed row is aligned
+            key=lambda position: (-position.dtype.itemsize, position.dtype.str, position.offset),
         )
         #: a row contains a copy of the whole output buffer
         recorded_bytes = sum(position.dtype.itemsize for position in numeric)
@@ -209,14 +211,6 @@ class Recorder:
             name: variable.unit.name if variable.unit else ""
             for name, variable in self.variables.items()
         }
-
-
-def _alignment_order(position: ArrayPosition) -> tuple[int, str, int]:
-    """Return a sort key.
-
-    Largest item size first, so that every value of a packed row is aligned.
-    """
-    return -position.dtype.itemsize, position.dtype.str, position.offset
 
 
 def _buffer_writer(chunk: memoryview, buffer: memoryview, size: int, first: int) -> RowWriter:

@@ -46,7 +46,11 @@ def check_run(system: System, settings: Settings) -> TimeGrid:
     problems += _find_resolution_problems(settings)
     problems += _find_period_problems(system, settings, grid)
     problems += _find_delay_problems(system)
-    problems += _find_event_time_problems(settings.events, grid)
+    for event in settings.events:
+        try:
+            grid.index(event.time)
+        except ValueError as error:
+            problems.append(Problem(f"event time {error}", event.where, subject=("events", "time")))
     if problems:
         raise InputError(problems)
     if not components_with_fixed_steps(system, settings):
@@ -133,14 +137,6 @@ def _find_event_problems(system: System, events: Iterable[Event]) -> Iterator[Pr
                     yield Problem(f"{reason}, an event cannot set it", event.where)
 
 
-def _find_event_time_problems(events: Iterable[Event], grid: TimeGrid) -> Iterator[Problem]:
-    for event in events:
-        try:
-            grid.index(event.time)
-        except ValueError as error:
-            yield Problem(f"event time {error}", event.where, subject=("events", "time"))
-
-
 def _fitting_step(system: System, settings: Settings) -> Fraction:
     """Return a step size that divides all intervals, if the given one does not fit them.
 
@@ -195,7 +191,13 @@ def _find_period_problems(system: System, settings: Settings, grid: TimeGrid) ->
 
     A too short duration is one problem.
     """
-    yield from _find_recording_problems(settings, grid)
+    interval = settings.record_interval or grid.step
+    if interval < grid.step or (interval / grid.step).denominator != 1:
+        text = (
+            f"recording interval {float(interval)!r} s is no multiple of the step size "
+            f"{float(grid.step)!r} s"
+        )
+        yield Problem(text, subject=("record", "interval"))
     late: dict[str, Fraction] = {}
     for name, period in system.periods.items():
         ratio = period / grid.step
@@ -229,13 +231,3 @@ def _find_delay_problems(system: System) -> Iterator[Problem]:
             f"{format_count(MAX_DELAYED_VALUES)}"
         )
         yield Problem(text, max(stored, key=lambda where: stored[where]), subject=("connections",))
-
-
-def _find_recording_problems(settings: Settings, grid: TimeGrid) -> Iterator[Problem]:
-    interval = settings.record_interval or grid.step
-    if interval < grid.step or (interval / grid.step).denominator != 1:
-        text = (
-            f"recording interval {float(interval)!r} s is no multiple of the step size "
-            f"{float(grid.step)!r} s"
-        )
-        yield Problem(text, subject=("record", "interval"))

@@ -56,13 +56,16 @@ class Schedule:
             replace(step, step_size=self.shorter_steps.get(step.name, step.step_size))
             for step in phase.steps
         ]
-        steps = [self.add_step(step, self._step_calls(step)) for step in sized]
+        steps = []
+        for step in sized:
+            calls = step.component.prepare_step_calls(self._runner.current_time, step.step_size)
+            steps.append(
+                self.add_step(
+                    step,
+                    calls or [PreparedCall(self._runner.run_python_component, (step,), "do_step")],
+                )
+            )
         return [*steps, self._schedule_loop(phase.loop, is_outermost)] if phase.loop else steps
-
-    def _step_calls(self, step: Step) -> Sequence[PreparedCall]:
-        return step.component.prepare_step_calls(self._runner.current_time, step.step_size) or [
-            PreparedCall(self._runner.run_python_component, (step,), "do_step")
-        ]
 
     def _schedule_loop(self, loop: Loop, is_outermost: bool) -> ScheduledStep:
         """Schedule all iterations of a loop as one call.

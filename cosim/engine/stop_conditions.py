@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.expressions import Expression, Reader, spelt_name
+from ..core.expressions import Reader, spelt_name
 from .layout import ArrayPosition
 from .plan import Plan
 from .settings import StopCondition, StopOutcome
@@ -121,16 +121,14 @@ class StopConditions:
 
     def _describe(self, condition: StopCondition, begin: int, end: int) -> MetCondition:
         parts = condition.expression.alternatives
-        cause = (
-            " or ".join(part.text for part in parts if self._is_met(part))
-            or condition.expression.text
-        )
+        causes = []
+        for part in parts:
+            value = part.bind(self._reader)()
+            if value and not math.isnan(value):
+                causes.append(part.text)
+        cause = " or ".join(causes) or condition.expression.text
         time_at = self._plan.grid.time_at
         return MetCondition(condition.name, condition.outcome, cause, time_at(begin), time_at(end))
-
-    def _is_met(self, expression: Expression) -> bool:
-        value = expression.bind(self._reader)()
-        return bool(value) and not math.isnan(value)
 
 
 _BINARY = {

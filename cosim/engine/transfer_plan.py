@@ -208,12 +208,21 @@ class TransferPlanner:
         given = [
             c
             for c in connections
-            if slope_endpoint(self._system, c.source) in self._outputs.positions
+            if c.source.component not in stepped
+            and slope_endpoint(self._system, c.source) in self._outputs.positions
         ]
-        given = [connection for connection in given if connection.source.component not in stepped]
         if given:
             yield self._delayed_or_converted(given, 0, True)
-            yield self._slope_transfer(given)
+            sources = [slope_endpoint(self._system, c.source) for c in given]
+            targets = [slope_endpoint(self._system, c.target) for c in given]
+            factor = np.array([self._conversion(connection)[0] for connection in given])
+            yield self._make_transfer(
+                [self._outputs.positions[source] for source in sources],
+                [self._inputs.positions[target] for target in targets],
+                0,
+                factor,
+                np.zeros_like(factor),
+            )
         for interpolates in (False, True):
             rest = [
                 c
@@ -222,18 +231,6 @@ class TransferPlanner:
             ]
             if rest:
                 yield self._linear_transfer(rest, interpolates)
-
-    def _slope_transfer(self, connections: Sequence[Connection]) -> Transfer:
-        sources = [slope_endpoint(self._system, c.source) for c in connections]
-        targets = [slope_endpoint(self._system, c.target) for c in connections]
-        factor = np.array([self._conversion(connection)[0] for connection in connections])
-        return self._make_transfer(
-            [self._outputs.positions[source] for source in sources],
-            [self._inputs.positions[target] for target in targets],
-            0,
-            factor,
-            np.zeros_like(factor),
-        )
 
     def _linear_transfer(self, connections: Sequence[Connection], interpolates: bool) -> Transfer:
         converted = any(self._conversion(connection) != (1.0, 0.0) for connection in connections)
@@ -272,12 +269,12 @@ class TransferPlanner:
         offsets = sorted(self._positions(connection)[1].offset for connection in connections)
         runs = [[offsets[0]]]
         for before, after in pairwise(offsets):
-            gap = range(before + 1, after)
+            gap = [ArrayPosition(target_dtype, offset) for offset in range(before + 1, after)]
             if all(
-                self._may_be_read_early(source_dtype, ArrayPosition(target_dtype, offset))
-                for offset in gap
+                (source_dtype, target) in self._copies and target not in self._targets_read
+                for target in gap
             ):
-                runs[-1] += [*gap, after]
+                runs[-1] += range(before + 1, after + 1)
             else:
                 runs.append([after])
         for run in runs:
@@ -289,9 +286,6 @@ class TransferPlanner:
                 ],
                 targets,
             )
-
-    def _may_be_read_early(self, source_dtype: Dtype, target: ArrayPosition) -> bool:
-        return (source_dtype, target) in self._copies and target not in self._targets_read
 
     def _make_transfer(
         self,

@@ -35,7 +35,13 @@ class LockedFolder:
 
     def __init__(self, prefix: str):
         _remove_abandoned_folders(tempfile.gettempdir())
-        self.name, lock = _create_locked_folder(prefix)
+        while True:
+            self.name = tempfile.mkdtemp(prefix=prefix)
+            lock = _lock_folder(self.name, wait=True)
+            if Path(self.name).is_dir():  # else another process removed it before it was locked
+                break
+            if lock is not None:
+                os.close(lock)
         self._finalizer = finalize(self, _remove_folder, self.name, lock, os.getpid())
 
     def cleanup(self) -> None:
@@ -53,23 +59,13 @@ def temporary_run_folder() -> Iterator[str]:
         folder.cleanup()
 
 
-def _remove_folder(folder: str, lock: int, owner: int) -> None:
+def _remove_folder(folder: str, lock: int | None, owner: int) -> None:
     """Remove the folder, except in a forked child; a later process removes remaining files."""
     if os.getpid() != owner:
         return
     rmtree(folder, ignore_errors=True)
-    with suppress(OSError):  # foreign code may have closed all descriptors
-        os.close(lock)
-
-
-def _create_locked_folder(prefix: str) -> tuple[str, int]:
-    """Return a new folder and the descriptor of its lock, -1 if the system has no locks."""
-    while True:
-        folder = tempfile.mkdtemp(prefix=prefix)
-        lock = _lock_folder(folder, wait=True)
-        if Path(folder).is_dir():  # else another process removed it before it was locked
-            return folder, -1 if lock is None else lock
-        if lock is not None:
+    if lock is not None:
+        with suppress(OSError):  # foreign code may have closed all descriptors
             os.close(lock)
 
 

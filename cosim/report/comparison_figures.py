@@ -15,6 +15,7 @@ from ..results.comparison import Comparer, Comparison, Verdict, match_tolerances
 from ..results.tolerance_tube import Tolerance
 
 WIDTH, HEIGHT = 7.16, 1.7  # in, of the figure and of each panel
+MAX_SIGNALS = 4  # of the tubes
 TUBE_COLOUR, OUTSIDE_COLOUR = "#0072B2", "#D55E00"
 COLUMN_WIDTH, PAGE_WIDTH, BAR_WIDTH = 3.5, 7.16, 0.8  # in
 #: range of real-time factors of the published simulator (Simulink and V-REP over TCP): figure 18
@@ -27,7 +28,6 @@ def draw_tubes(
     reference: Result,
     tolerances: Mapping[str, Tolerance],
     comparison: Comparison,
-    max_signals: int = 4,
 ) -> Figure:
     """Draw the signals with the largest deviations in their tubes, and the deviations beside them.
 
@@ -39,11 +39,9 @@ def draw_tubes(
         reference: The reference.
         tolerances: Tolerances by pattern of signal names.
         comparison: The outcome of the comparison.
-        max_signals: The largest number of signals.
     """
-    worst = [verdict for verdict in comparison.worst if reference[verdict.signal].dtype != object][
-        :max_signals
-    ]
+    worst = [each for each in comparison.worst if reference[each.signal].dtype != object]
+    worst = worst[:MAX_SIGNALS]
     figure = Figure(figsize=(WIDTH, HEIGHT * max(len(worst), 1)), layout="constrained")
     if not worst:
         figure.text(0.5, 0.5, "nothing can be compared", ha="center")

@@ -173,7 +173,7 @@ def write_figure_data(figure: Figure, path: Path) -> bool:
     """
     points: list[DataPoint] = []
     for axes in figure.axes:
-        points += [*_curve_points(axes), *_bar_points(axes)]
+        points += _data_points(axes)
     if not points:
         return False
     with (
@@ -189,11 +189,13 @@ def write_figure_data(figure: Figure, path: Path) -> bool:
     return True
 
 
-def _curve_points(axes: Axes) -> Iterator[DataPoint]:
-    """Yield the points of all curves of a panel.
+def _data_points(axes: Axes) -> Iterator[DataPoint]:
+    """Yield the points of all curves of a panel, and the heights of all bars.
 
     Markers without a label and lines across the axes are left out.
     """
+    from matplotlib.container import BarContainer
+
     panel = axes.get_ylabel().replace("\n", " ")
     for line in axes.lines:
         name, in_data_units = str(line.get_label()), line.get_transform() == axes.transData
@@ -203,13 +205,6 @@ def _curve_points(axes: Axes) -> Iterator[DataPoint]:
             xs, ys = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
             for x, y in zip(xs.tolist(), ys.tolist(), strict=True):
                 yield panel, curve, x, y
-
-
-def _bar_points(axes: Axes) -> Iterator[DataPoint]:
-    """Yield the heights of all bars of a panel."""
-    from matplotlib.container import BarContainer
-
-    panel = axes.get_ylabel().replace("\n", " ")
     for container in axes.containers:
         if isinstance(container, BarContainer):
             names = [label.get_text().replace("\n", " ") for label in axes.get_xticklabels()]

@@ -83,6 +83,11 @@ def render_report(
         )
     about, units = _metadata_with_defaults(result), result.metadata.get("kpi_units", {})
     failure = find_failure(result, outcomes)
+    cards = []
+    for each in outcomes:
+        name = each.check["kpi"]
+        value = format_number(each.value)
+        cards.append(KpiRow(name, value, units.get(name, ""), each.limits, each.passed))
     return render_page(
         "report.html",
         about=about,
@@ -92,7 +97,7 @@ def render_report(
         failed=sum(not outcome.passed for outcome in outcomes),
         reasons=result.metadata.get("check_notes", []),
         facts=list(_facts(result)),
-        cards=[_check_row(outcome, units) for outcome in outcomes],
+        cards=cards,
         kpis=_group_kpis(result.kpis, units),
         kpi_notes=result.metadata.get("kpi_notes", []),
         warnings=result.metadata.get("warnings", []),
@@ -136,21 +141,13 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
         yield "end", result.termination
 
 
-def _kpi_row(name: str, value: Number, units: Mapping[str, str]) -> KpiRow:
-    return KpiRow(name, format_number(value), units.get(name, ""))
-
-
-def _check_row(outcome: CheckOutcome, units: Mapping[str, str]) -> KpiRow:
-    row = _kpi_row(outcome.check["kpi"], outcome.value, units)
-    return row._replace(limits=outcome.limits, passed=outcome.passed)
-
-
 def _group_kpis(kpis: Mapping[str, Number], units: Mapping[str, str]) -> dict[str, list[KpiRow]]:
     """Return the values of each KPI function, by its name and without its name as their prefix."""
     groups: dict[str, list[KpiRow]] = {}
     for name, value in kpis.items():
         group, _, own = name.partition(".")
-        groups.setdefault(group, []).append(_kpi_row(name, value, units)._replace(name=own))
+        row = KpiRow(own, format_number(value), units.get(name, ""))
+        groups.setdefault(group, []).append(row)
     return groups
 
 

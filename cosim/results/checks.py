@@ -90,7 +90,13 @@ def evaluate_checks(
     problems = list(chain.from_iterable(_find_check_problems(kpis, check) for check in checks))
     if problems:
         raise InputError(problems)
-    return [_evaluate_check(check, kpis[check["kpi"]]) for check in checks]
+    outcomes = []
+    for check in checks:
+        value = kpis[check["kpi"]]
+        limits = [(LIMIT_OPERATORS[key], limit) for key, limit in check.items() if key != "kpi"]
+        passed = all(holds(value, limit) for holds, limit in limits)
+        outcomes.append(CheckOutcome(check, value, passed))
+    return outcomes
 
 
 def evaluate_all_checks(
@@ -124,11 +130,6 @@ def _find_check_problems(kpis: Mapping[str, Number], check: Mapping[str, Any]) -
             Problem(f"no limit given, expected one of {', '.join(LIMIT_OPERATORS)}", where)
         )
     return problems
-
-
-def _evaluate_check(check: Mapping[str, Any], value: Number) -> CheckOutcome:
-    passed = all(LIMIT_OPERATORS[key](value, limit) for key, limit in check.items() if key != "kpi")
-    return CheckOutcome(check, value, passed)
 
 
 #: number of rows that are examined at a time

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import re
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -51,32 +51,29 @@ def compare(result: Result, reference: Result, tolerances: Mapping[str, Toleranc
     Raises:
         InputError: A tolerance is negative, NaN or infinite.
     """
-    if problems := list(_find_tolerance_problems(tolerances)):
+    problems = []
+    for pattern, tolerance in tolerances.items():
+        for name, value in tolerance._asdict().items():
+            if not 0 <= value < math.inf:
+                expected = "expected a finite number of at least 0"
+                problems.append(f'tolerance of "{pattern}": "{name}" is {value}, {expected}')
+    if problems:
         raise InputError(problems)
     selected = match_tolerances(tolerances, list(reference))
     unmatched = [pattern for pattern in tolerances if not reference.signals(pattern)]
-    general = [
+    verdicts = [
         Verdict(
             f'"{pattern}"', f"matches no signal of the reference{pattern_hint(pattern, reference)}"
         )
         for pattern in unmatched
     ]
-    if not len(reference.time) or not len(result.time):
-        return Comparison(
-            (
-                *general,
-                Verdict(
-                    "the reference" if not len(reference.time) else "the result", "has no rows"
-                ),
-            )
-        )
+    for role, run in (("the reference", reference), ("the result", result)):
+        if not len(run.time):
+            return Comparison((*verdicts, Verdict(role, "has no rows")))
     comparer = Comparer(result, reference)
-    return Comparison(
-        (
-            *general,
-            *(comparer.compare_signal(name, tolerance) for name, tolerance in selected.items()),
-        )
-    )
+    for name, tolerance in selected.items():
+        verdicts.append(comparer.compare_signal(name, tolerance))
+    return Comparison(tuple(verdicts))
 
 
 def needed_share(result: Result, reference: Result, tolerances: Mapping[str, Tolerance]) -> float:
@@ -100,16 +97,6 @@ def needed_share(result: Result, reference: Result, tolerances: Mapping[str, Tol
         ).passed
 
     return bisect_left(range(SHARE_STEPS), True, key=passes) / SHARE_STEPS
-
-
-def _find_tolerance_problems(tolerances: Mapping[str, Tolerance]) -> Iterator[str]:
-    for pattern, tolerance in tolerances.items():
-        for name, value in tolerance._asdict().items():
-            if not 0 <= value < math.inf:
-                yield (
-                    f'tolerance of "{pattern}": "{name}" is {value}, expected a finite number of '
-                    "at least 0"
-                )
 
 
 def match_tolerances(tolerances: Mapping[str, Tolerance], names: list[str]) -> dict[str, Tolerance]:
@@ -162,28 +149,36 @@ class Comparer:
 
     def tube(self, name: str, tolerance: Tolerance, rows: slice | np.ndarray = slice(None)) -> Tube:
         """Return the tube around a signal of the reference at all `points`, or at some rows."""
-        return self._tube(
-            self.series(name)[1], self._half_width(name, tolerance), tolerance.time, rows
-        )
+        half_width = self._half_width(name, tolerance)
+        return self._tube(self.series(name)[1], half_width, tolerance.time, rows)
 
     def _tube(
         self,
         reference: np.ndarray,
         half_width: float,
         reach: float,
-        rows: slice | np.ndarray = slice(None),
+        rows: slice | np.ndarray,
     ) -> Tube:
         time = self.points.time[rows]
-        lower, upper = TimeWindows(self._reference.time, time, reach).extremes(reference)
+        windows = (
+            self._windows(reach)
+            if isinstance(rows, slice)
+            else TimeWindows(self._reference.time, time, reach)
+        )
+        lower, upper = windows.extremes(reference)
         return Tube(time, lower - half_width, upper + half_width)
+
+    @cached_property
+    def _windows(self) -> Callable[[float], TimeWindows]:
+        """Windows of some reach (s) around all points; signals with the same reach share them."""
+        return lru_cache(1)(partial(TimeWindows, self._reference.time, self.points.time))
 
     def _half_width(self, name: str, tolerance: Tolerance) -> float:
         return tolerance.half_width(_to_floats(self._reference, name))
 
     def is_outside(self, name: str, tolerance: Tolerance) -> np.ndarray:
         """Return whether the result is outside the tube around a signal, shape (points,)."""
-        values, reference = self.series(name)
-        tube = self._tube(reference, self._half_width(name, tolerance), tolerance.time)
+        values, tube = self.series(name)[0], self.tube(name, tolerance)
         return (values < tube.lower) | (values > tube.upper)
 
     def compare_signal(self, name: str, tolerance: Tolerance) -> Verdict:
@@ -248,7 +243,8 @@ class Comparer:
         ]
         time = np.union1d(covered, other)
         actual, expected = (
-            _sample_and_hold(run, name, time) for run in (self._result, self._reference)
+            run[name][np.searchsorted(run.time, time + time_tolerance(time), "right") - 1]
+            for run in (self._result, self._reference)
         )
         different = np.flatnonzero(actual != expected)
         if not different.size:
@@ -330,11 +326,6 @@ class Comparer:
 
 def _to_floats(run: Result, name: str) -> np.ndarray:
     return run[name].astype(np.float64, copy=False)
-
-
-def _sample_and_hold(run: Result, name: str, time: np.ndarray) -> np.ndarray:
-    """Return the strings that hold at these times (s), shape (times,)."""
-    return run[name][np.searchsorted(run.time, time + time_tolerance(time), "right") - 1]
 
 
 def _relative_excess(distance: float, half_width: float) -> float:

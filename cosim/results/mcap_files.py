@@ -84,18 +84,13 @@ def write_mcap(
             writer.write_metadata(
                 "run", {key: json.dumps(to_json_types(value)) for key, value in metadata.items()}
             )
-        times = _to_nanoseconds(recording.time)
+        time = recording.time
+        shifted = time - min(float(time[0]), 0.0) if len(time) else time
+        times = [round(1e9 * second) for second in shifted.tolist()]
         if scene and len(times):
-            from .mcap_files import log_scene
-
             log_scene(scene, times[0], context)
         _log_poses(recording, times, context)
         _log_signals(recording, times, context)
-
-
-def _to_nanoseconds(time: np.ndarray) -> list[int]:
-    shifted = time - min(float(time[0]), 0.0) if len(time) else time
-    return [round(1e9 * second) for second in shifted.tolist()]
 
 
 def _log_poses(recording: Recording, times: list[int], context: Any) -> None:

@@ -48,23 +48,16 @@ def write_parquet(recording: Recording, path: str | Path) -> None:
 
     columns = {"time": recording.time, **recording.columns}
     units = {"time": "s", **recording.units}
-    schema = pa.schema(
-        [
-            pa.field(name, _arrow_type(pa, values), metadata={"unit": units[name]})
-            for name, values in columns.items()
-        ]
-    )
+    fields = []
+    for name, values in columns.items():
+        kind = pa.string() if values.dtype == object else pa.from_numpy_dtype(values.dtype)
+        fields.append(pa.field(name, kind, metadata={"unit": units[name]}))
+    schema = pa.schema(fields)
     with writing_atomically(path) as temporary, ParquetWriter(temporary, schema) as writer:
         for piece in iterate_chunks(list(columns.values()), ROWS_PER_GROUP):
-            values = (np.ascontiguousarray(column[piece]) for column in columns.values())
-            arrays = [
-                pa.array(part, field.type) for part, field in zip(values, schema, strict=True)
-            ]
+            parts = (np.ascontiguousarray(column[piece]) for column in columns.values())
+            arrays = [pa.array(part, field.type) for part, field in zip(parts, schema, strict=True)]
             writer.write_batch(pa.record_batch(arrays, schema=schema))
-
-
-def _arrow_type(pa: Any, values: np.ndarray) -> Any:
-    return pa.string() if values.dtype == object else pa.from_numpy_dtype(values.dtype)
 
 
 def require_pandas() -> Any:

@@ -130,28 +130,19 @@ def write_reference(result: Result, path: Path, tolerances: Mapping[str, Toleran
     """
     reference = decimate(result, tolerances)
     reference.to_csv(path)
-    about = {
+    about: dict[str, Any] = {
         "name": result.metadata.get("name"),
         "signals": len(reference),
         "rows": len(reference.time),
     }
-    write_json({**about, **_provenance(result.metadata)}, path.with_suffix(".json"))
-    return reference
-
-
-def _provenance(metadata: Mapping[str, Any]) -> dict[str, Any]:
-    """Return versions, machine and hashes of `run.json`.
-
-    The Python files of a folder with many of them have one hash.
-    """
-    hashes = metadata.get("sha256") or {}
+    about |= {key: result.metadata.get(key) for key in _PROVENANCE_KEYS}
+    hashes = result.metadata.get("sha256") or {}
     counts = Counter(filter(None, map(_modules_of, hashes)))
-    return {
-        **{key: metadata.get(key) for key in _PROVENANCE_KEYS},
-        "sha256": _join_modules(
-            hashes, {name for name, count in counts.items() if count > MAX_SINGLE_MODULES}
-        ),
-    }
+    # the Python files of a folder with many of them have one hash
+    joined = {name for name, count in counts.items() if count > MAX_SINGLE_MODULES}
+    about["sha256"] = _join_modules(hashes, joined)
+    write_json(about, path.with_suffix(".json"))
+    return reference
 
 
 def _modules_of(name: str) -> str:

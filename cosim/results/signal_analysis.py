@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -92,7 +92,12 @@ def control_error(
         InputError: The units of both signals measure different quantities.
     """
     rows = row_slice(result, start, stop)
-    reference = _converted(result, target, signal) if isinstance(target, str) else target
+    if isinstance(target, str):
+        found, expected = (result.units.get(each, "") for each in (target, signal))
+        problem = f'"{target}" ({found}) cannot be compared with "{signal}" ({expected})'
+        reference: Any = _convert(result[target], found, expected, problem)
+    else:
+        reference = target
     return result.time[rows], (result[signal].astype(np.float64) - reference)[rows]
 
 
@@ -125,20 +130,6 @@ def values_in_si(result: Result, signal: str) -> np.ndarray:
     """
     unit = named_unit(result.units.get(signal, ""))
     return unit.factor * result[signal].astype(np.float64) + unit.offset
-
-
-def _converted(result: Result, name: str, to_unit_of: str) -> np.ndarray:
-    """Return the values of a signal in the unit of another one.
-
-    A signal without unit is not converted.
-    """
-    found, expected = (result.units.get(each, "") for each in (name, to_unit_of))
-    return _convert(
-        result[name],
-        found,
-        expected,
-        f'"{name}" ({found}) cannot be compared with "{to_unit_of}" ({expected})',
-    )
 
 
 def _convert(values: np.ndarray, found: str, expected: str, problem: str) -> np.ndarray:

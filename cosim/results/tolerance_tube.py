@@ -14,7 +14,7 @@ tolerance relative to the local value.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -84,14 +84,15 @@ class TimeWindows:
         for k, (windows, left, right) in enumerate(self._levels):
             if k:
                 row = choose(row[: -(2 ** (k - 1))], row[2 ** (k - 1) :])
-            if windows.size:
-                extremes[windows] = choose(extremes[windows], choose(row[left], row[right]))
+            if left.size:
+                rows = choose(row.take(left), row.take(right))
+                extremes[windows] = choose(extremes[windows], rows)
         return extremes
 
 
 def _doubling_levels(
     first: np.ndarray, last: np.ndarray
-) -> Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+) -> Iterator[tuple[np.ndarray | slice, np.ndarray, np.ndarray]]:
     """Yield for each k the windows of 2**k to 2**(k+1) - 1 rows.
 
     With the indices at which their first and their last 2**k rows begin.
@@ -99,7 +100,8 @@ def _doubling_levels(
     exponents = np.frexp(np.maximum(last - first + 1, 0))[1] - 1
     for k in range(int(exponents.max(initial=-1)) + 1):
         windows = np.flatnonzero(exponents == k)
-        yield windows, first[windows], last[windows] - 2**k + 1
+        all_or_some = slice(None) if windows.size == first.size else windows  # a slice is faster
+        yield all_or_some, first[windows], last[windows] - 2**k + 1
 
 
 class _Interpolation:
@@ -116,7 +118,7 @@ class _Interpolation:
 
     def values(self, reference: np.ndarray) -> np.ndarray:
         """Return the values at the moments, shape (moments,)."""
-        left, right = reference[self._left], reference[self._right]
+        left, right = reference.take(self._left), reference.take(self._right)
         return np.asarray(left + self._fraction * (right - left))
 
 

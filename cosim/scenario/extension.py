@@ -85,7 +85,10 @@ def expand_document(document: Document, extending: tuple[Path, ...] = ()) -> Doc
         return document
     base = expand_document(_read_base(document, value["extends"], extending), extending)
     merger = _Merger(document, base)
-    inherited = _inherited(base, document.file.parent)
+    inherited = {key: each for key, each in base.value.items() if key not in NOT_INHERITED}
+    old_folder, folder = base.file.parent, document.file.parent
+    if paths.resolve_path(old_folder) != paths.resolve_path(folder):
+        inherited = change_paths(inherited, relocating(old_folder, folder))
     changes = {key: each for key, each in value.items() if key != "extends"}
     changes |= _removals_with_components(inherited, changes)
     merged = merger.merge((), _Part(base, (), inherited), _Part(document, (), changes))
@@ -174,14 +177,6 @@ def _read_base(document: Document, name: Any, extending: tuple[Path, ...]) -> Do
     return base
 
 
-def _inherited(base: Document, folder: Path) -> dict[str, Any]:
-    """Return what a file in `folder` inherits, with paths relative to this folder."""
-    value = {key: each for key, each in base.value.items() if key not in NOT_INHERITED}
-    if paths.resolve_path(base.file.parent) == paths.resolve_path(folder):
-        return value
-    return change_paths(value, relocating(base.file.parent, folder))
-
-
 def _removals_with_components(
     inherited: Mapping[str, Any], changes: Mapping[str, Any]
 ) -> dict[str, Any]:
@@ -190,11 +185,9 @@ def _removals_with_components(
     What the extending file replaces itself is not among them.
     """
     components = changes.get("components")
-    removed = (
-        {name for name, each in components.items() if each is None}
-        if isinstance(components, dict)
-        else set()
-    )
+    if not isinstance(components, dict):
+        return {}
+    removed = {name for name, each in components.items() if each is None}
     if not removed:
         return {}
     result: dict[str, Any] = {}
@@ -228,12 +221,10 @@ def _without_sources(connection: Mapping[str, Any], removed: Set[str]) -> Mappin
         return None
     if len(kept) == len(names):
         return connection
-    gains = (
-        {"gain": [gain[i] for i in kept]}
-        if isinstance(gain, list) and len(gain) == len(names)
-        else {}
-    )
-    return {**connection, "from": [names[i] for i in kept], **gains}
+    changed = {**connection, "from": [names[i] for i in kept]}
+    if isinstance(gain, list) and len(gain) == len(names):
+        changed["gain"] = [gain[i] for i in kept]
+    return changed
 
 
 def _without_components(names: Sequence[Any], removed: Set[str]) -> list[Any]:

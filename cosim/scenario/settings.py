@@ -11,6 +11,7 @@ import json
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -55,17 +56,13 @@ def apply_settings(
         if text := next(_text_problems([name, value]), ""):
             problems.append(Problem(text, f'setting "{shorten(acceptable_text(name))}"'))
         elif name.startswith("/"):
-            change = (
-                relocating(Path(), None)
-                if folder is None
-                else relocating(folder, document.file.parent)
-            )
             try:
                 keys = pointer_keys(name)
                 value, files, documents = include_in_setting(
                     keys, move_objects(document, keys, value), folder or Path()
                 )
-                value = change_pointed(name, value, change)
+                target = None if folder is None else document.file.parent
+                value = change_pointed(name, value, relocating(folder or Path(), target))
             except InputError as error:
                 problems += error.located(f'setting "{name}"')
                 continue
@@ -123,8 +120,10 @@ def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
         if not separator or not name:
             problems.append(Problem(f'expected NAME=value, found "{text}"'))
             continue
+        parsed[name] = value
         try:
-            parsed[name] = _parse_json_or_text(value)
+            with suppress(ValueError):  # it is a text
+                parsed[name] = json.loads(value)
             if not _is_finite(parsed[name]):
                 problems.append(Problem(f"expected finite numbers, found {shorten(value)}", name))
         except RecursionError:
@@ -132,13 +131,6 @@ def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
     if problems:
         raise InputError(problems)
     return parsed
-
-
-def _parse_json_or_text(text: str) -> Any:
-    try:
-        return json.loads(text)
-    except ValueError:
-        return text
 
 
 def _is_finite(value: Any) -> bool:

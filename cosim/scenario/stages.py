@@ -54,12 +54,12 @@ class StagePlanner:
         direct = {name: _direct_inputs(components[name]) for name in targets}
         self._links: set[_Link] = set()
         for connection in connections:
-            source, target = connection.source, connection.target
-            variable = variables[target.component].get(target.scalar)
+            source, target = connection.source.component, connection.target.component
+            variable = variables[target].get(connection.target.scalar)
             if variable and not connection.delay:
-                inputs = direct[target.component]
+                inputs = direct[target]
                 is_direct = inputs is None or variable.name in inputs
-                self._links.add(_Link(source.component, target.component, is_direct))
+                self._links.add(_Link(source, target, is_direct))
 
     def root_stages(self, root: Node, spec: SystemSpec) -> tuple[Stage, ...]:
         """Return the root's stages.

@@ -11,7 +11,7 @@ import typing
 from collections.abc import Iterable, Mapping, Sequence
 from functools import reduce
 from itertools import chain, count
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
@@ -40,19 +40,13 @@ _MAX_ATTEMPTS = 10
 _LISTS_OF_NAMES = ("record", "kpis", "ports")
 
 
-class Validated(NamedTuple, Generic[S]):
-    """Specification without the invalid parts of its document, and the problems found."""
-
-    spec: S
-    problems: list[Problem]
-    #: keys of the root that are invalid or missing
-    invalid_keys: set[str]
-
-
-def validate_document(document: Document, kind: type[S]) -> Validated[S]:
+def validate_document(document: Document, kind: type[S]) -> tuple[S, list[Problem], set[str]]:
     """Convert a document to a specification of the class `kind`.
 
     Parts that are invalid are reported and removed.
+
+    Returns:
+        The specification, the problems found, and the keys of the root that are invalid or missing.
     """
     value, problems = copy_json(document.value), list(document.problems)
     if not isinstance(value, dict):
@@ -61,7 +55,7 @@ def validate_document(document: Document, kind: type[S]) -> Validated[S]:
                 Problem(f"expected an object, found {_shorten_json(value)}", document.where(()))
             )
         required = {key: each for key, each in _PLACEHOLDERS.items() if key in kind.model_fields}
-        return Validated(kind.model_validate(required), problems, set(kind.model_fields))
+        return kind.model_validate(required), problems, set(kind.model_fields)
     result = _validate(kind, value)
     if isinstance(result, ValidationError):
         problems += schema_problems(kind, document, result)
@@ -70,7 +64,7 @@ def validate_document(document: Document, kind: type[S]) -> Validated[S]:
         result = _validate(kind, value)
     for attempt in count():  # errors of later passes are consequences of the removals
         if not isinstance(result, ValidationError):
-            return Validated(result, problems, invalid_keys)
+            return result, problems, invalid_keys
         for detail in result.errors(include_url=False):
             path = _error_path(detail)
             if detail["type"] == "extra_forbidden":

@@ -100,11 +100,8 @@ def start_values(variable: Variable) -> Sequence[Any]:
     """Return the start values of all elements of an array."""
     start, size = variable.start, len(variable.scalar_names)
     if variable.type == "Binary":
-        start = (
-            tuple(map(parse_binary, start))
-            if isinstance(start, tuple)
-            else parse_binary(start or "")
-        )
+        is_list = isinstance(start, tuple)
+        start = tuple(map(parse_binary, start)) if is_list else parse_binary(start or "")
     if start is None:
         start = {"String": "", "Binary": b""}.get(variable.type, 0)
     return start if isinstance(start, tuple) else (start,) * size
@@ -161,12 +158,12 @@ def _limits(variable: Variable) -> tuple[float | None, float | None]:
     if variable.dtype.kind in "iu":
         smallest, largest = np.iinfo(variable.dtype).min, np.iinfo(variable.dtype).max
     elif variable.type == "Float32":
-        smallest, largest = float(np.finfo(np.float32).min), float(np.finfo(np.float32).max)
+        largest = float(np.finfo(np.float32).max)
+        smallest = -largest
     else:
         return low, high
-    return smallest if low is None else max(low, smallest), largest if high is None else min(
-        high, largest
-    )
+    lower = smallest if low is None else max(low, smallest)
+    return lower, largest if high is None else min(high, largest)
 
 
 def _type_accepts(kind: str, value: Any) -> bool:

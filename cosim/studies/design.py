@@ -55,13 +55,11 @@ def build_factor(spec: FactorSpec, gridded: bool) -> Factor:
 
     It has the levels of a full factorial design if it is `gridded`.
     """
-    if spec.levels is not None:
-        return _listed_factor(
-            spec.name, [Level(label, settings) for label, settings in spec.levels.items()]
-        )
     paths = spec.set or []
-    if spec.values is not None:
-        return _listed_factor(spec.name, [level_of_value(paths, value) for value in spec.values])
+    listed = [Level(label, settings) for label, settings in (spec.levels or {}).items()]
+    listed += [level_of_value(paths, value) for value in spec.values or ()]
+    if listed:
+        return Factor(spec.name, listed_levels=listed, grid_levels=listed)
     count = spec.level_count if gridded else 0
     if spec.range is not None:
         exact = _range_quantile(spec.range)
@@ -73,10 +71,6 @@ def build_factor(spec: FactorSpec, gridded: bool) -> Factor:
     quantile = (lambda coordinate: round(exact(coordinate))) if spec.integer else exact
     grid = [level_of_value(paths, quantile(coordinate)) for coordinate in coordinates]
     return Factor(spec.name, paths, quantile=quantile, grid_levels=grid)
-
-
-def _listed_factor(name: str, levels: Sequence[Level]) -> Factor:
-    return Factor(name, listed_levels=levels, grid_levels=levels)
 
 
 def _range_quantile(spec: RangeSpec) -> Callable[[float], float]:

@@ -120,7 +120,15 @@ def _start_coordinates(parameters: Sequence[ParameterSpec]) -> list[float]:
 
     A parameter without a start value begins in the middle.
     """
-    return [0.5 if each.start is None else _coordinate(each, each.start) for each in parameters]
+    coordinates = []
+    for each in parameters:
+        if each.start is None:
+            coordinates.append(0.5)
+        elif each.scale == "log":
+            coordinates.append(math.log(each.start / each.min) / math.log(each.max / each.min))
+        else:
+            coordinates.append((each.start - each.min) / (each.max - each.min))
+    return coordinates
 
 
 def _value(spec: ParameterSpec, coordinate: float) -> float:
@@ -133,12 +141,6 @@ def _value(spec: ParameterSpec, coordinate: float) -> float:
         )
         return float(f"{count * unit:.12g}")
     return min(max(float(f"{value:.12g}"), spec.min), spec.max)
-
-
-def _coordinate(spec: ParameterSpec, value: float) -> float:
-    if spec.scale == "log":
-        return math.log(value / spec.min) / math.log(spec.max / spec.min)
-    return (value - spec.min) / (spec.max - spec.min)
 
 
 @dataclass(frozen=True)

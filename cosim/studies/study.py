@@ -99,10 +99,8 @@ class Study:
         Args:
             names: names of the KPIs, in the order of "success".
         """
-        kpis, folder = (
-            [kpi for _, kpi in accepted(self._scenario.spec.kpis)],
-            self._scenario.root.folder,
-        )
+        kpis = [kpi for _, kpi in accepted(self._scenario.spec.kpis)]
+        folder = self._scenario.root.folder
         problems = []
         for i, name in enumerate(names):
             if text := kpi_name_problem(name, kpis, folder):

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from itertools import chain
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from markdown_parts import code, page, plain, table
 
@@ -124,8 +123,7 @@ def settings_of(role_name: str, scenario: Path) -> set[str]:
     substitution = ControllerSubstitution(
         role, parse_source(str(role.controllers[0])), nothing, scenario
     )
-    with TemporaryDirectory() as folder:
-        substitution.write(Path(folder))
+    substitution.substitute(Path())  # nothing is written
     return {each.lacking for each in substitution.omissions if not each.entry}
 
 

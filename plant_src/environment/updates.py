@@ -43,7 +43,12 @@ class SurfaceTable:
                 vessel.model.body.boxes, key=lambda box: box.position[2] + box.half_extents[2]
             )
             row[:2] = deck.half_extents[:2]
-            self._decks.append((row[_CENTRE].data, row[_ORIENTATION].data, *_deck_pose(vessel)))
+            slots = vessel.model.slots("output")
+            first, turn = slots.index("deck.position.x"), slots.index("orientation.w")
+            centre, orientation = vessel.outputs[first:][:3], vessel.outputs[turn:][:4]
+            self._decks.append(
+                (row[_CENTRE].data, row[_ORIENTATION].data, centre.data, orientation.data)
+            )
         for row, platform in zip(self.rows[len(vessels) :], platforms, strict=False):
             x, y, z = platform.position
             edge_x, edge_y, edge_z = platform.size
@@ -54,15 +59,6 @@ class SurfaceTable:
         for centre, orientation, deck_centre, deck_orientation in self._decks:
             centre[:] = deck_centre
             orientation[:] = deck_orientation
-
-
-def _deck_pose(vessel: ContactBody) -> tuple[Any, Any]:
-    """Return views of the outputs with the position and the orientation of the deck."""
-    slots = vessel.model.slots("output")
-    position, orientation = slots.index("deck.position.x"), slots.index("orientation.w")
-    return vessel.outputs[position : position + 3].data, vessel.outputs[
-        orientation : orientation + 4
-    ].data
 
 
 _GRID_TOLERANCE = 1e-6  # in grid steps of the noise; times are not exact multiples of the grid step
@@ -145,18 +141,14 @@ class CurrentUpdate:
     def update(self, time: float) -> None:
         """Write the current at a time (s)."""
         x, y = _unpack_pair(self._mean)
-        for change_x, change_y in self._velocity_changes(time):
+        if self._ramp:
+            change_x, change_y = self._ramp.change_at(time)
+            x, y = x + change_x, y + change_y
+        if self._noise:
+            change_x, change_y = self._noise[int(time / GRID_STEP + _GRID_TOLERANCE)]
             x, y = x + change_x, y + change_y
         for current in self._current_inputs:
             _pack_pair(current, 0, x, y)
-
-    def _velocity_changes(self, time: float) -> list[Sequence[float]]:
-        changes: list[Sequence[float]] = []
-        if self._ramp:
-            changes.append(self._ramp.change_at(time))
-        if self._noise:
-            changes.append(self._noise[int(time / GRID_STEP + _GRID_TOLERANCE)])
-        return changes
 
 
 class WaterLevelUpdate:

@@ -263,15 +263,14 @@ def _shapes(client: int, obstacle: Obstacle) -> Iterator[int]:
 def _bounding_boxes(
     platforms: Sequence[Platform], obstacles: Sequence[Obstacle]
 ) -> list[BoundingBox]:
-    boxes = [_platform_bounding_box(platform) for platform in platforms]
+    boxes = []
+    for platform in platforms:
+        x, y, z = platform.position
+        half_x, half_y, half_z = (edge / 2 for edge in platform.size)
+        low, high = (x - half_x, y - half_y, z - half_z), (x + half_x, y + half_y, z + half_z)
+        boxes.append(BoundingBox(low, high))
     parts = [part.reshape(-1, 3) for obstacle in obstacles for part in obstacle.parts]
     return boxes + [
         BoundingBox(tuple(part.min(axis=0).tolist()), tuple(part.max(axis=0).tolist()))
         for part in parts
     ]
-
-
-def _platform_bounding_box(platform: Platform) -> BoundingBox:
-    x, y, z = platform.position
-    half_x, half_y, half_z = (edge / 2 for edge in platform.size)
-    return BoundingBox((x - half_x, y - half_y, z - half_z), (x + half_x, y + half_y, z + half_z))

@@ -57,7 +57,13 @@ class CompiledEquations:
     def __init__(self, model: Model):
         self._library = ctypes.PyDLL(str(library_path(model.binary)))
         try:
-            self._refuse_other_variables(model)
+            expected = model.equation_variables_text
+            if interface_hash(expected) != self._text("hash"):
+                here, there = first_difference(expected, self._text("variables"))
+                raise InputError(
+                    f'"{_fmu_path(model.binary)}" was built from other variables: found "{there}", '
+                    f'expected "{here}"; {_rebuilding(model.binary)}'
+                )
             self.functions = read_functions(self._text("functions"))
         except ValueError:
             raise InputError(
@@ -73,15 +79,6 @@ class CompiledEquations:
         """Return an exported text. Raises ValueError if the library has none."""
         address = ctypes.addressof(ctypes.c_char.in_dll(self._library, f"equations_{name}"))
         return ctypes.string_at(address).decode()
-
-    def _refuse_other_variables(self, model: Model) -> None:
-        expected = model.equation_variables_text
-        if interface_hash(expected) != self._text("hash"):
-            here, there = first_difference(expected, self._text("variables"))
-            raise InputError(
-                f'"{_fmu_path(model.binary)}" was built from other variables: found "{there}", '
-                f'expected "{here}"; {_rebuilding(model.binary)}'
-            )
 
     def _refuse_other_sizes(self, model: Model) -> None:
         """Raise InputError if the world divides the variables among the arrays in another way."""
@@ -197,29 +194,19 @@ def _cached_library_path(
         raise InputError(
             f'"{fmu}" has no "{member}"; {_rebuilding(model)} on this platform'
         ) from None
-    return _extract_to_cache(content, cache_folder, f"{model}{suffix}")
+    # the name contains a hash of the content, and a damaged file is replaced
+    path = cache_folder / f"{sha256(content).hexdigest()[:20]}-{model}{suffix}"
+    try:
+        is_intact = path.read_bytes() == content
+    except OSError:
+        is_intact = False
+    if not is_intact:
+        with writing_atomically(path) as temporary:
+            temporary.write_bytes(content)
+    return path
 
 
 def _unreadable_fmu_error(model: str, fmu: Path, error: Exception) -> InputError:
     return InputError(
         f'the equations of the vehicle model "{model}" cannot be read from "{fmu}": {error}'
     )
-
-
-def _extract_to_cache(content: bytes, cache_folder: Path, name: str) -> Path:
-    """Write a file to the cache.
-
-    Its name contains a hash of its content, and a damaged file is replaced.
-    """
-    path = cache_folder / f"{sha256(content).hexdigest()[:20]}-{name}"
-    if not _has_content(path, content):
-        with writing_atomically(path) as temporary:
-            temporary.write_bytes(content)
-    return path
-
-
-def _has_content(path: Path, content: bytes) -> bool:
-    try:
-        return path.read_bytes() == content
-    except OSError:
-        return False

@@ -148,19 +148,13 @@ class Fleet:
         self._impulse_magnitudes: Any = memory.of_all_vehicles["impulse_magnitude"].data
         #: whether a vehicle without contact may have moved away from what it was near
         self._near_vehicles_outdated = True
-        self._warm_up_inertia()
-        self._set_active_bodies([True] * len(self.bodies))
-
-    def _warm_up_inertia(self) -> None:
-        """Make one Bullet step without contact.
-
-        Bullet applies a changed inertia only from the next step on.
-        """
+        # Bullet applies a changed inertia only from the next step on: one step without contact
         for active in (False, True):
             for body in self.bodies:
                 body.set_active(active)
             if not active:
-                pybullet.stepSimulation(self._client)
+                pybullet.stepSimulation(client)
+        self._set_active_bodies([True] * len(self.bodies))
 
     def advance(self, step_fraction: float) -> None:
         """Advance all vehicles by one step.
@@ -178,7 +172,9 @@ class Fleet:
             self._handle_step_status()
         if self._active_bodies:
             if self._contact_memory.watched_pairs and self._contact_memory.is_unsafe():
-                self._forget_contact_points()
+                self._remove_contact_points()
+                for body in self._active_bodies:
+                    body.reset_pose()
             self._solve_contacts()
         for correct in self._correct:
             correct()
@@ -235,11 +231,6 @@ class Fleet:
             for body in self._active_bodies:
                 body.reset_pose()
             self._step_bullet()
-
-    def _forget_contact_points(self) -> None:
-        self._remove_contact_points()
-        for body in self._active_bodies:
-            body.reset_pose()
 
     def _step_bullet(self) -> None:
         client = self._client

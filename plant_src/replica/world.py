@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,12 +18,11 @@ from cosim.core.component import Component, Ports, Variable
 from cosim.core.errors import ComponentError, InputError, Problem, did_you_mean
 
 from .. import world_settings
-from ..physics.bullet import connect, create_compound_shape, pybullet, set_dynamics
-from ..placement import Platform, VehiclePlacement
+from ..physics.bullet import connect, create_platform, pybullet
+from ..placement import DRY, Platform, VehiclePlacement
 from ..scene import replay
 from ..variable_views import recorded_others
 from ..vehicles.common.interface import MAX_STATE_NORM
-from ..vehicles.common.shapes import Box
 from .bodies import Quadcopter, Vessel
 from .bus import INPUTS, OUTPUTS
 
@@ -101,7 +100,7 @@ class World(Component):
     ) -> None:
         pybullet.setGravity(0, 0, -9.81, physicsClientId=self._client)
         for platform in platforms:
-            _add_platform(self._client, platform)
+            create_platform(self._client, replace(platform, surface=DRY))
         self._quadcopter = Quadcopter(self._client, tuple(vehicles["uav"].parameters.values()))
         self._vessel = Vessel(self._client, tuple(vehicles["usv"].parameters.values()))
         self._check_overlaps()
@@ -282,10 +281,3 @@ def _read_arguments(
     }
     settings = world_settings.read_world_settings(specs, platforms, {}, {})
     return {vehicle.name: vehicle for vehicle in settings.vehicles}, list(settings.platforms)
-
-
-def _add_platform(client: int, platform: Platform) -> None:
-    x, y, z = platform.size
-    shape = create_compound_shape([Box((x / 2, y / 2, z / 2), (0.0, 0.0, 0.0))], client)
-    body = pybullet.createMultiBody(0, shape, -1, platform.position, physicsClientId=client)
-    set_dynamics(client, body, -1)

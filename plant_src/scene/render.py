@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -26,17 +27,19 @@ from .parts import static_parts, tree_parts, vehicle_parts
 from .solid_renderer import Picture, SolidRenderer, View
 
 
+@dataclass(frozen=True, eq=False)
 class Layer:
     """Picture with transparency, onto which vehicles are blended.
 
-    Args:
+    Attributes:
         colour: Colour premultiplied by alpha, shape (height, width, 3).
         alpha: Opacity in 0 ... 1, shape (height, width).
         depth: Depth (m), shape (height, width); not changed by blending.
     """
 
-    def __init__(self, colour: np.ndarray, alpha: np.ndarray, depth: np.ndarray):
-        self.colour, self.alpha, self.depth = colour, alpha, depth
+    colour: np.ndarray
+    alpha: np.ndarray
+    depth: np.ndarray
 
     @classmethod
     def from_solids(cls, solids: Picture) -> Layer:

@@ -34,22 +34,28 @@ from .parts import (
 _COUNTER_CLOCKWISE = "towards which it moves, counter-clockwise from x (east)"
 
 
-def environment_schemas() -> dict[str, Schema]:
-    """Return the schemas of the environment and of the objects in it by name."""
+_WAVE_HEIGHT_RANGE: Schema = {"type": "number", "minimum": 0, "maximum": MAX_SIGNIFICANT_HEIGHT}
+_HEIGHT_RANGE: Schema = {"type": "number", "minimum": MIN_HEIGHT, "maximum": MAX_HEIGHT}
+_EXPONENT_RANGE: Schema = {"type": "number", "minimum": 0, "maximum": 1}
+
+
+def _flow(axes: str) -> dict[str, Schema]:
+    """Return the keys of a mean velocity: speed and direction, or a vector with these axes."""
+    zeros = [0.3, 0.1, 0][: len(axes)]
     return {
-        "WorldEnvironment": _environment(),
-        "WorldWaves": _waves(),
-        "WorldWind": _wind(),
-        "WorldTurbulence": _turbulence(),
-        "WorldWindProfile": _profile(),
-        "WorldCurrent": _current(),
-        "WorldCurrentRamp": _ramp(),
-        "WorldCurrentVariation": _variation(),
+        "speed": documented_value(
+            AT_LEAST_0, "mean speed; required unless `velocity` is given", "m/s", 5
+        ),
+        "direction": documented_value(NUMBER, f"direction {_COUNTER_CLOCKWISE}", "rad", 1.0, 0.0),
+        "velocity": documented_vector(
+            f"mean velocity [{', '.join(axes)}], in place of `speed` and `direction`", "m/s", zeros
+        ),
     }
 
 
-def _environment() -> Schema:
-    return documented_object(
+#: schemas of the environment and of the objects in it by name
+ENVIRONMENT_SCHEMAS: dict[str, Schema] = {
+    "WorldEnvironment": documented_object(
         (
             "Waves, wind and current of a world. Directions are those towards which waves, wind "
             "and current move."
@@ -82,17 +88,12 @@ def _environment() -> Schema:
                 "WorldCurrent", "current of the water; default: none", {"velocity": [0.3, 0.1]}
             ),
         },
-        (),
-    )
-
-
-def _waves() -> Schema:
-    height: Schema = {"type": "number", "minimum": 0, "maximum": MAX_SIGNIFICANT_HEIGHT}
-    return documented_object(
+    ),
+    "WorldWaves": documented_object(
         "Irregular waves. The significant height is required unless `sea_state` gives it.",
         {
             "significant_height": documented_value(
-                height, "significant height Hs, in place of `sea_state`", "m", 0.5
+                _WAVE_HEIGHT_RANGE, "significant height Hs, in place of `sea_state`", "m", 0.5
             ),
             "peak_period": documented_value(
                 POSITIVE,
@@ -130,26 +131,8 @@ def _waves() -> Schema:
                 MAX_COMPONENTS,
             ),
         },
-        (),
-    )
-
-
-def _flow(axes: str) -> dict[str, Schema]:
-    """Return the keys of a mean velocity: speed and direction, or a vector with these axes."""
-    zeros = [0.3, 0.1, 0][: len(axes)]
-    return {
-        "speed": documented_value(
-            AT_LEAST_0, "mean speed; required unless `velocity` is given", "m/s", 5
-        ),
-        "direction": documented_value(NUMBER, f"direction {_COUNTER_CLOCKWISE}", "rad", 1.0, 0.0),
-        "velocity": documented_vector(
-            f"mean velocity [{', '.join(axes)}], in place of `speed` and `direction`", "m/s", zeros
-        ),
-    }
-
-
-def _wind() -> Schema:
-    return documented_object(
+    ),
+    "WorldWind": documented_object(
         "Mean wind, its profile over the height, and gusts.",
         {
             **_flow("xyz"),
@@ -167,13 +150,8 @@ def _wind() -> Schema:
                 {"exponent": 0.14},
             ),
         },
-        (),
-    )
-
-
-def _turbulence() -> Schema:
-    height: Schema = {"type": "number", "minimum": MIN_HEIGHT, "maximum": MAX_HEIGHT}
-    return documented_object(
+    ),
+    "WorldTurbulence": documented_object(
         "Gusts.",
         {
             "speed_20ft": documented_value(
@@ -185,7 +163,11 @@ def _turbulence() -> Schema:
                 [0.5, 0.5, 0.3],
             ),
             "height": documented_value(
-                height, "height above ground of the turbulence model", "m", 10, TURBULENCE_HEIGHT
+                _HEIGHT_RANGE,
+                "height above ground of the turbulence model",
+                "m",
+                10,
+                TURBULENCE_HEIGHT,
             ),
             "airspeed": documented_value(
                 POSITIVE,
@@ -194,16 +176,11 @@ def _turbulence() -> Schema:
                 5,
             ),
         },
-        (),
-    )
-
-
-def _profile() -> Schema:
-    exponent: Schema = {"type": "number", "minimum": 0, "maximum": 1}
-    return documented_object(
+    ),
+    "WorldWindProfile": documented_object(
         "Wind over the height: a power law or a logarithmic profile.",
         {
-            "exponent": documented_value(exponent, "exponent of the power law", "1", 0.14),
+            "exponent": documented_value(_EXPONENT_RANGE, "exponent of the power law", "1", 0.14),
             "roughness": documented_value(
                 POSITIVE,
                 "roughness length of the logarithmic profile, in place of `exponent`",
@@ -218,12 +195,8 @@ def _profile() -> Schema:
                 REFERENCE_HEIGHT,
             ),
         },
-        (),
-    )
-
-
-def _current() -> Schema:
-    return documented_object(
+    ),
+    "WorldCurrent": documented_object(
         "Current of the water, equal at all places.",
         {
             **_flow("xy"),
@@ -238,12 +211,8 @@ def _current() -> Schema:
                 {"standard_deviation": 0.05, "time_constant": 60},
             ),
         },
-        (),
-    )
-
-
-def _ramp() -> Schema:
-    return documented_object(
+    ),
+    "WorldCurrentRamp": documented_object(
         "Change of the current that grows linearly.",
         {
             "change": documented_vector("change [x, y] at the end of the ramp", "m/s", [0.1, 0]),
@@ -251,15 +220,13 @@ def _ramp() -> Schema:
             "duration": documented_value(POSITIVE, "duration", "s", 20),
         },
         ("change", "duration"),
-    )
-
-
-def _variation() -> Schema:
-    return documented_object(
+    ),
+    "WorldCurrentVariation": documented_object(
         "First-order Gauss-Markov process in x and y.",
         {
             "standard_deviation": documented_value(AT_LEAST_0, "standard deviation", "m/s", 0.05),
             "time_constant": documented_value(POSITIVE, "correlation time", "s", 60),
         },
         ("standard_deviation", "time_constant"),
-    )
+    ),
+}

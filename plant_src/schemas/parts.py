@@ -63,7 +63,7 @@ def family_schema(name: str, properties: Mapping[str, Schema], required: tuple[s
     return {"title": name, **object_schema({**common, **properties}, ("family", *required))}
 
 
-def object_schema(properties: Mapping[str, Schema], required: tuple[str, ...]) -> Schema:
+def object_schema(properties: Mapping[str, Schema], required: tuple[str, ...] = ()) -> Schema:
     """Return the schema of an object with these keys and texts, and no others."""
     texts = dict.fromkeys(TEXT_KEYS, TEXT)
     return {
@@ -104,7 +104,7 @@ def placed_schema(
             "link of the URDF file in place of position and axis, for `cosim new vehicle --urdf`"
         ),
     }
-    schema = object_schema({**place, "link": link, **properties}, ())
+    schema = object_schema({**place, "link": link, **properties})
     others = [key for key in required if key not in ("position", "axis")]
     del schema["required"]
     return {**schema, "anyOf": [{"required": list(required)}, {"required": ["link", *others]}]}
@@ -147,7 +147,7 @@ def with_unit(value: Schema, unit: str, description: str) -> Schema:
 
 
 def documented_object(
-    description: str, properties: dict[str, Schema], required: tuple[str, ...]
+    description: str, properties: dict[str, Schema], required: tuple[str, ...] = ()
 ) -> Schema:
     """Return the schema of an object with exactly these keys, for the reference and editors."""
     return {

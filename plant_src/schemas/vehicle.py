@@ -57,7 +57,7 @@ def planar_vessel_schema() -> Schema:
             "height": quantity_schema(
                 "m", "height of the origin above the still water", signed=True
             ),
-            "quadratic_damping": {"anyOf": [*quadratic["anyOf"], object_schema(matrices, ())]},
+            "quadratic_damping": {"anyOf": [*quadratic["anyOf"], object_schema(matrices)]},
             "cubic_damping": vector_schema(
                 "SI units", f"load over cubed velocity, {velocities}", 3
             ),
@@ -90,7 +90,7 @@ def _vessel_properties(size: int, velocities: str) -> dict[str, Schema]:
             "m", "centre of the top of the landing deck; default: top of the highest box", 3
         ),
         "propeller": {
-            **object_schema(quantities, ()),
+            **object_schema(quantities),
             "description": "what all propellers have in common",
         },
         "propellers": list_schema(

@@ -8,7 +8,7 @@ Defaults, limits and lists of names are those of the readers.
 from __future__ import annotations
 
 from ..placement import CONCRETE, DRY
-from .environment import environment_schemas
+from .environment import ENVIRONMENT_SCHEMAS
 from .parts import (
     AT_LEAST_0,
     NUMBER,
@@ -54,7 +54,7 @@ def world_schema() -> Schema:
         ("vehicles",),
     )
     kinds = {"WorldVehicle": _vehicle(), "WorldPlatform": _platform(), "WorldObstacle": _obstacle()}
-    return {**root, "$defs": {**kinds, **environment_schemas()}}
+    return {**root, "$defs": {**kinds, **ENVIRONMENT_SCHEMAS}}
 
 
 def _vehicle() -> Schema:

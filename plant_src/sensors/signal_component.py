@@ -208,15 +208,6 @@ class SignalComponent(Component):
             setattr(self, name, deepcopy(value))
         self.apply_parameters()
 
-    def free_state(self, state: Any) -> None:
-        """Do nothing: a state holds no resources."""
-
-    def terminate(self) -> None:
-        """Do nothing: there is nothing to end."""
-
-    def free(self) -> None:
-        """Do nothing: there are no resources."""
-
 
 class SampledSensor(SignalComponent):
     """Sensor with a sample rate and a latency.

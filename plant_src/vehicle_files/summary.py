@@ -33,22 +33,17 @@ def boat_properties(boat: Boat) -> Iterator[tuple[str, str]]:
         yield "draught", f"{boat.draught:.4g} m"
     if speed := top_speed(boat):
         yield "top speed", f"{speed:.3g} m/s in calm water, all propellers at their largest speed"
-    levers = list(_turning_levers(boat))
+    levers = [
+        (f"propeller_speed[{i}] ({each.label})", turning_lever(boat, each))
+        for i, each in enumerate(boat.propellers, 1)
+    ]
+    for i, rudder in enumerate(boat.rudders, 1):
+        if rudder.max_angle > 0:  # no keel; a positive angle pushes the hull there to port
+            lever = rudder.position[0] - boat.centre_of_mass[0]
+            levers.append((f"rudder_angle[{i}] ({rudder.label})", lever))
     for side, sign in (("port", 1), ("starboard", -1)):
         if names := [name for name, lever in levers if sign * lever > _MIN_LEVER]:
             yield f"to {side}", f"positive {', '.join(names)}"
-
-
-def _turning_levers(boat: Boat) -> Iterator[tuple[str, float]]:
-    """Yield name and lever (m) of each input that turns the vessel.
-
-    A positive rudder angle pushes the hull there to port.
-    """
-    for i, propeller in enumerate(boat.propellers, 1):
-        yield f"propeller_speed[{i}] ({propeller.label})", turning_lever(boat, propeller)
-    for i, rudder in enumerate(boat.rudders, 1):
-        if rudder.max_angle > 0:  # no keel
-            yield f"rudder_angle[{i}] ({rudder.label})", rudder.position[0] - boat.centre_of_mass[0]
 
 
 def top_speed(boat: Boat) -> float:

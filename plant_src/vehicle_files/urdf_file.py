@@ -34,7 +34,12 @@ class UrdfFile:
         self._owners: dict[ET.Element, ET.Element] = {}
         for child in self.root:
             self._owners |= dict.fromkeys(child.iter(), child)
-        self._check_elements()
+        if self.root.tag != "robot":
+            raise self.error(self.root, f"found <{self.root.tag}>, expected <robot>")
+        for element in self.root.iter():
+            if element.tag.startswith("xacro:"):
+                text = f"found <{element.tag}>; expand the file with xacro first"
+                raise InputError(Problem(text, self.where(element)))
         self.links = self._by_name("link")
         self._by_name("joint")
 
@@ -52,18 +57,6 @@ class UrdfFile:
         except expat.ExpatError as error:
             raise InputError(Problem(f"cannot be read as XML: {error}", str(self.path))) from None
         return builder.close()
-
-    def _check_elements(self) -> None:
-        if self.root.tag != "robot":
-            raise self.error(self.root, f"found <{self.root.tag}>, expected <robot>")
-        for element in self.root.iter():
-            if element.tag.startswith("xacro:"):
-                raise InputError(
-                    Problem(
-                        f"found <{element.tag}>; expand the file with xacro first",
-                        self.where(element),
-                    )
-                )
 
     def _by_name(self, tag: str) -> dict[str, ET.Element]:
         """Return the elements with this tag by name."""

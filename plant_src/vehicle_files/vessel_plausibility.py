@@ -19,7 +19,6 @@ from ..vehicles.model import Model
 from ..vehicles.planar_vessel.planar_vessel import PlanarVessel
 from ..vehicles.submerged.craft import Craft
 from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel
-from ..vehicles.vessel.actuators import Propeller
 from ..vehicles.vessel.boat import Boat
 
 #: largest ratio of the thrust of all propellers to the weight: shipped vessels have at most 0.42,
@@ -52,7 +51,10 @@ def vessel_warnings(model: Model, corners: np.ndarray, max_length: float) -> Ite
         yield from _boat_warnings(model.boat, corners)
     if isinstance(model.boat, SurfaceVessel):
         yield from _hull_warnings(model.boat, max_length)
-        yield from _draught_warnings(model.boat)
+        if (draught := -model.boat.hull.bottom) > 0:
+            displaced = model.boat.water_density * model.boat.hull.area * draught
+            source = f"draught of {draught:.4g} m (hull.bottom with a minus sign)"
+            yield from _mass_warnings(model.boat.mass, displaced, source)
         yield from _shape_warnings(model, corners, model.boat.hull.length)
     if model.craft:
         yield from _craft_warnings(model.craft, float(np.linalg.norm(corners, axis=1).max()))
@@ -73,7 +75,10 @@ def _boat_warnings(boat: Boat, corners: np.ndarray) -> Iterator[Problem]:
     yield from _resistance_warnings(
         *surge_damping(boat), *(each.advance_coefficient for each in boat.propellers)
     )
-    yield from _azimuth_warnings(boat.propellers)
+    for i, each in enumerate(boat.propellers):
+        if 2 * math.pi < each.max_azimuth <= 360:  # larger ones mean "no limit"
+            text = f"found {each.max_azimuth:g}, {RADIANS_EXPECTED}"
+            yield warning(text, "propellers", str(i), "max_azimuth")
     low, high = _bounds(boat, corners)
     yield from _position_warnings(boat, low, high)
     yield from _height_warnings(boat, high[2])
@@ -147,17 +152,6 @@ def _resistance_warnings(*coefficients: float) -> Iterator[Problem]:
             "quadratic_damping"
         )
         yield warning(text, "linear_damping")
-
-
-def _azimuth_warnings(propellers: Sequence[Propeller]) -> Iterator[Problem]:
-    """Yield a warning for each largest azimuth angle of more than a turn and at most 360 rad.
-
-    Larger ones mean "no limit".
-    """
-    for i, propeller in enumerate(propellers):
-        if 2 * math.pi < propeller.max_azimuth <= 360:
-            text = f"found {propeller.max_azimuth:g}, {RADIANS_EXPECTED}"
-            yield warning(text, "propellers", str(i), "max_azimuth")
 
 
 def _bounds(boat: Boat, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -238,16 +232,6 @@ def _shape_warnings(model: Model, corners: np.ndarray, length: float) -> Iterato
                 ),
                 key,
             )
-
-
-def _draught_warnings(vessel: SurfaceVessel) -> Iterator[Problem]:
-    if vessel.hull.bottom < 0:
-        displaced = vessel.water_density * vessel.hull.area * -vessel.hull.bottom
-        yield from _mass_warnings(
-            vessel.mass,
-            displaced,
-            f"draught of {-vessel.hull.bottom:.4g} m (hull.bottom with a minus sign)",
-        )
 
 
 def _mass_warnings(mass: float, displaced: float, source: str) -> Iterator[Problem]:

@@ -152,10 +152,10 @@ def mutants(document, path):
 
 def problems(document, kind, tmp_path):
     """Return the problems of a document and of its inline nested systems."""
-    found = validate_document(Document(tmp_path / "x.json", "", document), kind)
-    inner = [each.nested_system for each in found.spec.components.values()]
+    spec, found, _ = validate_document(Document(tmp_path / "x.json", "", document), kind)
+    inner = [each.nested_system for each in spec.components.values()]
     return [
-        *found.problems,
+        *found,
         *chain.from_iterable(
             problems(each, NestedSpec, tmp_path) for each in inner if isinstance(each, dict)
         ),
@@ -192,7 +192,8 @@ def test_the_schemas_are_valid_and_accept_the_documents(kind, tmp_path):
 @pytest.mark.parametrize(("text", "seconds"), [("1/100", 0.01), ("+1/4", 0.25), ("2/1", 2.0)])
 def test_a_time_may_be_a_fraction_in_text(text, seconds, tmp_path):
     document = Document(tmp_path / "x.json", "", SCENARIO | {"step_size": text})
-    assert float(validate_document(document, ScenarioSpec).spec.step_size) == seconds
+    spec, _, _ = validate_document(document, ScenarioSpec)
+    assert float(spec.step_size) == seconds
 
 
 @pytest.mark.parametrize("value", ["x", [1], {}, "1"])

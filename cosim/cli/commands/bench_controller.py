@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +22,7 @@ from ...studies.regression import (
 )
 from .. import supervision
 from ..bench_output import (
-    BenchProgress,
+    print_heading,
     print_omissions,
     print_ranking,
     print_side_by_side,
@@ -115,22 +116,11 @@ def command(
     that --all adds to a named CONTROLLER do not affect it.
     """
     from ...scenario.settings import parse_settings
+    from ...studies.controller_bench.candidate import parse_source
     from ...studies.controller_bench.role import read_role
 
     shipped = [str(path) for path in read_role(role).different_controllers] if with_shipped else []
     sources = list(dict.fromkeys([*controllers, *shipped]))
-    _check_sources(sources, settings)
-    files = list(find_scenario_files(scenarios or [default_folder()]))
-    check_unique_names(files)
-    bench = _Bench(role, files, output_dir, jobs or available_processors(), as_json)
-    if len(sources) == 1 and not with_shipped:
-        return bench.run_one(sources[0], parse_settings(settings))
-    return bench.run_all(sources, number_of_own=len(set(controllers)) or len(sources))
-
-
-def _check_sources(sources: Sequence[str], settings: Sequence[str]) -> None:
-    from ...studies.controller_bench.candidate import parse_source
-
     if not sources:
         raise click.UsageError("name a CONTROLLER, or --all")
     if settings and len(sources) > 1:
@@ -140,6 +130,12 @@ def _check_sources(sources: Sequence[str], settings: Sequence[str]) -> None:
         raise InputError(
             f'2 controllers are called "{repeated}": their results would go to one folder'
         )
+    files = list(find_scenario_files(scenarios or [default_folder()]))
+    check_unique_names(files)
+    bench = _Bench(role, files, output_dir, jobs or available_processors(), as_json)
+    if len(sources) == 1 and not with_shipped:
+        return bench.run_one(sources[0], parse_settings(settings))
+    return bench.run_all(sources, number_of_own=len(set(controllers)) or len(sources))
 
 
 @dataclass(frozen=True)
@@ -180,9 +176,10 @@ class _Bench:
         from ...studies.controller_bench.page import order, write_bench_page
 
         everything: list[ControllerTrials] = []
-        progress = BenchProgress(len(sources), quiet=self.as_json)
-        for source in sources:
-            progress.print_next(parse_source(source).name)
+        began = time.perf_counter()
+        for finished, source in enumerate(sources):
+            if not self.as_json:
+                print_heading(parse_source(source).name, finished, len(sources), began)
             everything.append(self._run_trials(source, {}))
         if not self.as_json:
             click.echo("measuring the processor time per step")

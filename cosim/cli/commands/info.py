@@ -192,17 +192,13 @@ def _source_name(file: FmuFile) -> str:
     "" if it is not in the FMU.
     """
     name = file.description.model_name.replace("_", "").lower()
-    sources = (
-        Path(member)
-        for member in file.examination.members
-        if member.startswith("resources/") and member.count("/") == 1
-    )
-    own = (
-        each.name
-        for each in sources
-        if each.suffix in (".mo", ".py") and each.stem.replace("_", "").lower() == name
-    )
-    return next(own, "")
+    for member in file.examination.members:
+        folder, _, source = member.rpartition("/")
+        stem, _, suffix = source.rpartition(".")
+        is_own = suffix in ("mo", "py") and stem.replace("_", "").lower() == name
+        if folder == "resources" and is_own:
+            return source
+    return ""
 
 
 def _needed_tool(about: FmuDescription) -> str:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 import re
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import click
 
@@ -74,34 +74,25 @@ def vehicle(
         raise InputError(f'"{name}" is not a name of a vehicle: expected letters, digits and "_"')
     file, source = directory / f"{name}.json", read_document(_find_vehicle(base))
     refuse_existing([file], force)
-    vehicle = _vehicle(source, name, urdf, mesh, mesh_scale)
-    text = json.dumps(vehicle.data, indent=4) + "\n" if urdf or mesh else source.text
+    data, balance, parameters, warnings = _vehicle(source, name, urdf, mesh, mesh_scale)
+    text = json.dumps(data, indent=4) + "\n" if urdf or mesh else source.text
     write_file(file, text)
-    for warning in vehicle.warnings:
+    for warning in warnings:
         click.echo(f"WARNING {warning}", err=True)
+    has_own_hull = bool(urdf or mesh) and data["family"] == "surface_vessel"
     build = shlex.join(["cosim", "build", str(file), "--output", str(file.with_suffix(".fmu"))])
     click.echo(
-        f"{file}: {vehicle.balance}\n\n{_use(file, base, vehicle, bool(urdf or mesh))}As an FMU:\n "
-        f" {build}"
+        f"{file}: {balance}\n\n{_use(file, base, parameters, has_own_hull)}As an FMU:\n  {build}"
     )
-
-
-class _Vehicle(NamedTuple):
-    """Data of a vehicle; mass, inertia, centre of mass and performance in words.
-
-    Parameters of its controller; mistakes.
-    """
-
-    data: Mapping[str, Any]
-    balance: str
-    parameters: Mapping[str, Any]
-    warnings: Sequence[str]
 
 
 def _vehicle(
     source: Document, name: str, urdf: Path | None, mesh: Path | None, mesh_scale: float
-) -> _Vehicle:
+) -> tuple[Mapping[str, Any], str, Mapping[str, Any], list[str]]:
     """Return the data of a vehicle file with those of a URDF file or mesh.
+
+    Also mass, inertia, centre of mass and performance in words, the parameters of its controller,
+    and warnings.
 
     Raises:
         InputError: A scenario would refuse the data; each problem names the file and the place in
@@ -136,9 +127,8 @@ def _vehicle(
         raise InputError(list(map(located, error.problems))) from None
     balance = f"mass {mass:.4g} kg, inertia {inertia} kg.m2{balance}"
     balance += "".join(f"\n  {key:<12} {text}" for key, text in performance.items())
-    return _Vehicle(
-        data, balance, parameters, [*warnings, *(str(located(problem)) for problem in found)]
-    )
+    warnings += [str(located(problem)) for problem in found]
+    return data, balance, parameters, warnings
 
 
 def _located(problem: Problem, source: Document, imported: Mapping[str, Path | None]) -> Problem:
@@ -151,23 +141,20 @@ def _located(problem: Problem, source: Document, imported: Mapping[str, Path | N
     return Problem(problem.message, source.where(path))
 
 
-def _use(file: Path, base: str, vehicle: _Vehicle, has_imported_shape: bool) -> str:
+def _use(file: Path, base: str, parameters: Mapping[str, Any], has_own_hull: bool) -> str:
     """Return how to use the vehicle in a scenario.
 
     The controllers of Demo 1 fly multirotors like the AR.Drone only.
     """
-    family = vehicle.data["family"]
     if base == "ar_drone":
         setting = f"/components/plant/arguments/vehicles/uav/model={file}"
         return f"Fly Demo 1 with it:\n  cosim run demo1_box --set {shlex.quote(setting)}\n"
     text = f'Name it in a scenario, as a vehicle of the plant:\n  {{"model": "{file}", ...}}\n'
-    if vehicle.parameters:
-        lines = ",\n".join(
-            f'    "{key}": {json.dumps(value)}' for key, value in vehicle.parameters.items()
-        )
+    if parameters:
+        lines = ",\n".join(f'    "{key}": {json.dumps(value)}' for key, value in parameters.items())
         text += "multirotor_controller.fmu flies it with these parameters (see crazyflie_square):\n"
         text += f'  "parameters": {{\n{lines}}}\n'
-    if family == "surface_vessel" and has_imported_shape:
+    if has_own_hull:
         text += (
             "The imported shape is drawn and collides. Buoyancy, waves and drag act on the "
             'dimensions in "hull".\n'

@@ -181,10 +181,11 @@ def _simulate(
 
 def _save_after_crash(outcome: SupervisedOutcome, output: _Output | None) -> None:
     """Write the rows of a child process that crashed, was killed or was interrupted."""
+    from ...process.run_files import recover_recording
     from ...results.checks import warn_non_finite
 
     print_log()
-    recording = supervision.recover_outcome_recording(outcome)
+    recording = recover_recording(outcome.journal.folder, outcome.row_count)
     warn_non_finite(recording)
     _write_recording(recording, output, outcome.journal.folder)
 

@@ -12,7 +12,7 @@ from ..messages import print_json
 from ..options import PATH, json_option
 
 if TYPE_CHECKING:
-    from ...components.fmi.preflight import Finding
+    from ...components.fmi.preflight.findings import Finding
 
 
 @click.command()
@@ -52,7 +52,7 @@ def command(fmus: tuple[Path, ...], as_json: bool) -> int:
 
 
 def _validate_fmu(path: Path) -> Sequence[Finding]:
-    from ...components.fmi.preflight import Finding
+    from ...components.fmi.preflight.findings import Finding
     from ...components.fmi.preflight.validation import validate_fmu
     from ...core.errors import InputError
 

@@ -4,7 +4,7 @@ from .co_simulation import CoSimulationFmu
 from .description import DefaultExperiment, FmuDescription
 from .driver import FmuComponent, FmuDriver
 from .file import FmuFile, open_fmu
-from .preflight import Interface
+from .preflight.model_description import Interface
 from .settings import InstanceSettings, Isolation, Method, SolverSettings
 
 __all__ = [

@@ -28,9 +28,9 @@ from .accessor_calls import AccessorCallFactory
 from .description import FmuDescription
 from .file import FmuFile
 from .library import MissingFunctionError, as_pointer, load_library, unregister_logger
-from .preflight import Interface
 from .preflight.binary import version_deviations
 from .preflight.functions import ACCESSORS, function_prefix
+from .preflight.model_description import Interface
 from .preflight.platforms import EXPECTED_TEXTS
 from .settings import InstanceSettings
 
@@ -43,9 +43,6 @@ _LOG_LEVELS = {
     DISCARD: component_log.WARNING,
 }
 
-#: reads the meaning of a bad status of a prepared call, given its name and the status
-StatusReader = Callable[[str, int], StepResult]
-
 
 class StepFlags:
     """Memory into which fmi3DoStep writes what happened in the step."""
@@ -55,13 +52,8 @@ class StepFlags:
         self.booleans, self.reached = (ctypes.c_bool * 4)(), ctypes.c_double()
         self._combined = ctypes.c_uint32.from_buffer(self.booleans)
 
-    @property
-    def is_set(self) -> bool:
-        """True if eventHandlingNeeded, terminateSimulation or earlyReturn is true."""
-        return bool(self._combined.value)
-
     def check(self) -> int:
-        """Return the status discard if a flag is set."""
+        """Return discard if eventHandlingNeeded, terminateSimulation or earlyReturn is true."""
         return DISCARD if self._combined.value else OK
 
 
@@ -320,15 +312,15 @@ class FmiApi(ABC):
     def execute(
         self,
         calls: Sequence[PreparedCall],
-        read_status: StatusReader | None = None,
+        read_status: Callable[[str, int], StepResult] | None = None,
         begin: float | None = None,
     ) -> StepResult | None:
         """Execute prepared calls outside the executors.
 
         Args:
             calls: The calls.
-            read_status: Reads the meaning of a bad status, which ends the calls; by default it is
-                a failure.
+            read_status: Reads the meaning of a bad status, which ends the calls, given the name of
+                the call and the status; by default it is a failure.
             begin: Time (s) at which the calls are made; by default `current_time`.
         """
         time = self.current_time.value if begin is None else begin

@@ -31,7 +31,12 @@ def find_changed_sources(file: FmuFile) -> list[Path]:
     """
     changed = []
     for source, checksums in _find_sources(file).items():
-        if set(map(crc32, _contents(source))).isdisjoint(checksums):
+        contents = [source.read_bytes()]
+        if source.suffix == ".py":
+            # `cosim build` may have made the imports relative
+            with suppress(SyntaxError, ValueError):  # such a file has not been exported
+                contents.append(read_with_relative_imports(source, source.parent).encode())
+        if set(map(crc32, contents)).isdisjoint(checksums):
             changed.append(source)
     return changed
 
@@ -87,14 +92,3 @@ def _source_folders(folder: Path) -> Iterator[Path]:
         yield controllers
         yield from sorted(each for each in controllers.glob("*") if each.is_dir())
         yield project
-
-
-def _contents(source: Path) -> Iterator[bytes]:
-    """Yield what `cosim build` may have made of a source.
-
-    The file, and a Python file with relative imports.
-    """
-    yield source.read_bytes()
-    if source.suffix == ".py":
-        with suppress(SyntaxError, ValueError):  # such a file has not been exported
-            yield read_with_relative_imports(source, source.parent).encode()

@@ -11,7 +11,7 @@ from ...core import component_log
 from ...core.component import PreparedCall, StepResult
 from ...core.errors import ComponentError
 from .accessor_calls import AccessorCallFactory
-from .api import StepFlags
+from .api import OK, StepFlags
 from .driver import MAX_EVENTS_PER_STEP, FmuDriver, is_value
 from .versions import STEP_FLAGS_CHECK
 
@@ -132,7 +132,7 @@ class CoSimulationFmu(FmuDriver):
         instance, _, _, *others = self._do_step_call.arguments
         arguments = (instance, ctypes.c_double(begin), ctypes.c_double(duration), *others)
         self.api.execute([self._do_step_call._replace(arguments=arguments)], begin=begin)
-        return self._flags.is_set
+        return self._flags.check() != OK
 
     # -- states and end
 

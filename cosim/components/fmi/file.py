@@ -17,17 +17,11 @@ from ...core.errors import InputError, join_alternatives
 from ...process.journal import current_journal, suspending_deadline
 from ...process.temporary_folders import FMU_PREFIX, LockedFolder
 from .description import FmuDescription, build_description
-from .preflight import (
-    RUN_WARNINGS,
-    Examination,
-    Interface,
-    examine,
-    extract,
-    open_regular_file,
-    raise_errors,
-)
-from .preflight.archive import Archive
+from .preflight import Examination, examine, extract
+from .preflight.archive import Archive, open_regular_file
 from .preflight.binary import WINDOWS, list_platforms
+from .preflight.findings import RUN_WARNINGS, raise_errors
+from .preflight.model_description import Interface
 from .preflight.platforms import current_platform
 
 #: largest number of FMU contents, and of extracted folders on the disk

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from ...process.journal import Deadlines
 from .description import DefaultExperiment, FmuDescription
-from .preflight import Interface
+from .preflight.model_description import Interface
 
 #: integration method: explicit Euler and Runge-Kutta of order 4 at fixed step size, or CVODE with
 #: variable step size

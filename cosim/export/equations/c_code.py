@@ -189,22 +189,14 @@ class StatementGenerator:
             if operation == ca.OP_CALL:
                 yield from self._call(k)
             elif operation == ca.OP_INPUT:
-                self._load_argument(k)
+                target = self._function.instruction_output(k)[0]
+                self._values[target] = self._access.argument(*self._function.instruction_input(k))
             elif operation == ca.OP_CONST:
-                self._load_constant(k)
+                value = self._function.instruction_constant(k)
+                self._values[self._function.instruction_output(k)[0]] = text = _literal(value)
+                self._constants[text] = value
             else:
                 yield self._assign(k, operation)
-
-    def _load_argument(self, k: int) -> None:
-        argument, element = self._function.instruction_input(k)
-        self._values[self._function.instruction_output(k)[0]] = self._access.argument(
-            argument, element
-        )
-
-    def _load_constant(self, k: int) -> None:
-        value = self._function.instruction_constant(k)
-        self._values[self._function.instruction_output(k)[0]] = text = _literal(value)
-        self._constants[text] = value
 
     def _assign(self, k: int, operation: int) -> str:
         targets, operands = (
@@ -225,7 +217,11 @@ class StatementGenerator:
         divisor = self._constants.get(operands[-1]) if operation == ca.OP_DIV else None
         if divisor and math.isfinite(1 / divisor):
             return f"{operands[0]} * {_literal(1 / divisor)}"
-        return _operation(self._function, operation).format(*operands)
+        if operation not in _OPERATIONS:
+            raise ValueError(
+                f"{self._function.name()}: the CasADi operation {operation} has no counterpart in C"
+            )
+        return _OPERATIONS[operation].format(*operands)
 
     def _call(self, k: int) -> Iterator[str]:
         """Generate a call.
@@ -259,14 +255,6 @@ def _pointer(values: Sequence[str]) -> str | None:
     argument, first = match[1], int(match[2])
     consecutive = [f"in[{argument}][{first + k}]" for k in range(len(values))]
     return f"in[{argument}] + {first}" if list(values) == consecutive else None
-
-
-def _operation(function: ca.Function, operation: int) -> str:
-    if operation not in _OPERATIONS:
-        raise ValueError(
-            f"{function.name()}: the CasADi operation {operation} has no counterpart in C"
-        )
-    return _OPERATIONS[operation]
 
 
 def _literal(value: float) -> str:

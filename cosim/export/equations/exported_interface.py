@@ -69,8 +69,14 @@ def interface_code(
     """
     text = describe_variables(variables, states)
     sizes: dict[str, int] = {}
+    function_lines = []
     for function in functions:
-        for name, size in _arrays(function):
+        arrays = [(function.name_in(i), function.numel_in(i)) for i in range(function.n_in())]
+        arrays += [(function.name_out(i), function.numel_out(i)) for i in range(function.n_out())]
+        words = [f"{name} {size}" for name, size in arrays]
+        words.insert(function.n_in(), "->")
+        function_lines.append(" ".join([function.name(), *words]))
+        for name, size in arrays:
             if sizes.setdefault(name, size) != size:
                 raise ValueError(
                     f'{function.name()}: the array "{name}" has {size} elements, and '
@@ -79,25 +85,12 @@ def interface_code(
     texts = {
         "hash": [interface_hash(text)],
         "variables": text.split("\n"),
-        "functions": [_function_line(function) for function in functions],
+        "functions": function_lines,
     }
     return "".join(
         f"\nMODEL_EXPORT const char equations_{name}[] =\n{_string_literal(lines)};\n"
         for name, lines in texts.items()
     )
-
-
-def _arrays(function: ca.Function) -> list[tuple[str, int]]:
-    arguments = [(function.name_in(i), function.numel_in(i)) for i in range(function.n_in())]
-    return arguments + [
-        (function.name_out(i), function.numel_out(i)) for i in range(function.n_out())
-    ]
-
-
-def _function_line(function: ca.Function) -> str:
-    words = [f"{name} {size}" for name, size in _arrays(function)]
-    words.insert(function.n_in(), "->")
-    return " ".join([function.name(), *words])
 
 
 def _string_literal(lines: Sequence[str]) -> str:

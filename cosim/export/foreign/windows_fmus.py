@@ -16,9 +16,9 @@ from hashlib import sha256
 from pathlib import Path
 
 from ...components.fmi import FmuFile
-from ...components.fmi.preflight import open_regular_file, raise_errors
-from ...components.fmi.preflight.archive import Archive
+from ...components.fmi.preflight.archive import Archive, open_regular_file
 from ...components.fmi.preflight.binary import WINDOWS, check_binary
+from ...components.fmi.preflight.findings import raise_errors
 from ...components.fmi.preflight.platforms import current_platform
 from ...core.errors import InputError
 from ...core.resources import cache_directory

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import errno
 import os
+import struct
 import sys
 from collections.abc import Iterator, Sequence
 from itertools import chain
@@ -130,7 +131,8 @@ def enter_filter() -> None:
         OSError: The kernel refused the filter.
     """
     program = b"".join(
-        _encode(instruction) for instruction in filter_program(os.uname().machine, os.getpid())
+        struct.pack("<HBBI", *instruction)
+        for instruction in filter_program(os.uname().machine, os.getpid())
     )
     instructions = ctypes.create_string_buffer(program, len(program))
     header = _Program(len(program) // 8, ctypes.addressof(instructions))
@@ -142,11 +144,6 @@ def enter_filter() -> None:
 
 class _Program(ctypes.Structure):
     _fields_ = [("length", ctypes.c_ushort), ("instructions", ctypes.c_void_p)]
-
-
-def _encode(instruction: Instruction) -> bytes:
-    code, if_true, if_false, operand = instruction
-    return code.to_bytes(2, "little") + bytes([if_true, if_false]) + operand.to_bytes(4, "little")
 
 
 def filter_program(machine: str, process: int) -> list[Instruction]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 import select
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from fractions import Fraction
 from multiprocessing.connection import Connection
 from typing import Any
@@ -29,8 +29,7 @@ from ...scenario.name_resolution import check_assignment
 #: smallest and largest factor of the command "speed"
 MIN_SPEED_FACTOR, MAX_SPEED_FACTOR = 0.01, 1000.0
 
-#: carries out a message with the command before the step that starts at communication point n
-_Command = Callable[[int, Mapping[str, Any]], None]
+COMMANDS = ("pause", "resume", "step", "speed", "set")
 
 
 class LiveControl:
@@ -65,13 +64,6 @@ class LiveControl:
         self._poller.register(connection.fileno(), select.POLLIN)
         self._speed, self._paused, self._steps = speed, False, 0
         self._pacer: Pacer | None = None
-        self._commands: Mapping[str, _Command] = {
-            "pause": self._pause,
-            "resume": self._resume,
-            "step": self._step,
-            "speed": self._set_speed,
-            "set": self._set,
-        }
         self._events: list[dict[str, Any]] = []
 
     def __call__(self, n: int) -> None:
@@ -124,10 +116,7 @@ class LiveControl:
         message = json.loads(self._connection.recv_bytes())
         reply: dict[str, Any] = {"id": message.get("id")}
         try:
-            name = str(message.get("command"))
-            if name not in self._commands:
-                raise InputError(f'unknown command "{name}"{did_you_mean(name, self._commands)}')
-            self._commands[name](n, message)
+            self._execute(n, message)
         except InputError as error:
             reply["error"] = str(error)
         except ComponentError as error:
@@ -135,19 +124,25 @@ class LiveControl:
             raise
         self._send({**reply, **self._state(n)})
 
-    def _pause(self, _n: int, _message: Mapping[str, Any]) -> None:
-        self._paused, self._steps = True, 0
+    def _execute(self, n: int, message: Mapping[str, Any]) -> None:
+        """Carry out a command before the step that starts at communication point n."""
+        match str(message.get("command")):
+            case "pause":
+                self._paused, self._steps = True, 0
+            case "resume":
+                self._paused = False
+                self._restart_pacer(n)
+            case "step":
+                self._paused = True
+                self._steps += 1
+            case "speed":
+                self._set_speed(n, message.get("factor"))
+            case "set":
+                self._set(n, str(message.get("name")), message.get("value"))
+            case name:
+                raise InputError(f'unknown command "{name}"{did_you_mean(name, COMMANDS)}')
 
-    def _resume(self, n: int, _message: Mapping[str, Any]) -> None:
-        self._paused = False
-        self._restart_pacer(n)
-
-    def _step(self, _n: int, _message: Mapping[str, Any]) -> None:
-        self._paused = True
-        self._steps += 1
-
-    def _set_speed(self, n: int, message: Mapping[str, Any]) -> None:
-        factor = message.get("factor")
+    def _set_speed(self, n: int, factor: Any) -> None:
         is_number = isinstance(factor, int | float) and not isinstance(factor, bool)
         if factor is not None and not (
             is_number and MIN_SPEED_FACTOR <= factor <= MAX_SPEED_FACTOR
@@ -165,8 +160,7 @@ class LiveControl:
         if self._pacer:
             self._pacer.start(n)
 
-    def _set(self, n: int, message: Mapping[str, Any]) -> None:
-        full_name, value = str(message.get("name")), message.get("value")
+    def _set(self, n: int, full_name: str, value: Any) -> None:
         if full_name not in self._adjustable:
             hint = did_you_mean(full_name, self._adjustable)
             raise InputError(

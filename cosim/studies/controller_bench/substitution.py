@@ -123,12 +123,6 @@ class ControllerSubstitution:
         self.changed_files[path] = self._prune_scenario(changed, renamed, origin)
         return path
 
-    def write(self, folder: Path) -> Path | None:
-        """Write the changed scenario and its nested systems to `folder`; see `substitute`."""
-        path = self.substitute(folder)
-        self.write_files()
-        return path
-
     def write_files(self) -> None:
         """Write the changed scenario and its nested systems."""
         for path, content in self.changed_files.items():

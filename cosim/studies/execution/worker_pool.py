@@ -225,7 +225,11 @@ class WorkerPool:
     def _request(self, job: Job, check: bool, **more: Any) -> bytes:
         request = {"key": job.key, "settings": job.settings, "check": check, **more}
         for _ in range(MAX_ATTEMPTS):
-            worker = self._acquire_worker()
+            with self._lock:
+                if self._closed:
+                    raise WorkerLostError("the worker pool is closed")
+                worker = self._idle.pop() if self._idle else self._start_worker()
+                self._busy.add(worker)
             try:
                 answer = worker.request(request)
             except WorkerLostError:
@@ -237,14 +241,6 @@ class WorkerPool:
                 self._idle.append(worker)
             return answer
         raise WorkerLostError(f"the worker process of the run was killed {MAX_ATTEMPTS} times")
-
-    def _acquire_worker(self) -> Worker:
-        with self._lock:
-            if self._closed:
-                raise WorkerLostError("the worker pool is closed")
-            worker = self._idle.pop() if self._idle else self._start_worker()
-            self._busy.add(worker)
-            return worker
 
     def _start_worker(self) -> Worker:
         if self._fork_server:

@@ -10,7 +10,6 @@ import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,7 @@ from ...results.files import remove_files, write_file
 from ..design import Design
 from ..execution.job import Job, Record
 from ..execution.run import ReplayRequest
-from ..execution.worker_pool import LocalRunner, WorkerPool
+from ..execution.worker_pool import LocalRunner
 from ..sweep import Sweep, SweepRow
 from .success_map import MAP_NAME, MapCell, SuccessMap
 from .success_map_figure import draw_map
@@ -184,18 +183,16 @@ def write_replays(sweep: Sweep, runs: Iterable[int], folder: Path, workers: int)
     missing = {run: page for run, page in pages.items() if not page.exists()}
     (folder / REPLAY_FOLDER).mkdir(exist_ok=True)
     with LocalRunner(sweep.study.context, workers) as runner, ThreadPoolExecutor(workers) as pool:
-        records = pool.map(
-            partial(_write_replay, sweep, runner.worker_pool), missing, missing.values()
-        )
+
+        def write(run: int, page: Path) -> Record:
+            job = Job(sweep.keys[run], run_settings(sweep, run))
+            title = _replay_title(sweep, run)
+            request = ReplayRequest(title, str(page.resolve()), sweep.criteria)
+            return runner.worker_pool.replay(job, request)
+
+        records = pool.map(write, missing, missing.values())
         causes = {run: record.failure for run, record in zip(missing, records, strict=True)}
     return {run: causes[run] for run, page in missing.items() if not page.exists()}
-
-
-def _write_replay(sweep: Sweep, pool: WorkerPool, run: int, page: Path) -> Record:
-    job = Job(sweep.keys[run], run_settings(sweep, run))
-    return pool.replay(
-        job, ReplayRequest(_replay_title(sweep, run), str(page.resolve()), sweep.criteria)
-    )
 
 
 def _replay_title(sweep: Sweep, run: int) -> str:

@@ -59,7 +59,13 @@ def draw_map(map_: SuccessMap, link: CellLink = lambda _cell: "") -> Figure:
     cast(Any, figure.get_layout_engine()).set(w_pad=GAP / 2, h_pad=GAP / 2, wspace=0, hspace=0)
     grid = figure.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
     for axes in grid.flat:
-        _prepare_panel(axes, layout)
+        axes.set(xlim=(-0.5, len(xs) - 0.5), ylim=(-0.5, len(ys) - 0.5))
+        rotation = 90 if layout.rotate_x_labels else 0
+        axes.set_xticks(list(layout.x_ticks), layout.x_ticks.values(), rotation=rotation)
+        axes.set_yticks(list(layout.y_ticks), layout.y_ticks.values())
+        axes.tick_params(length=0, labelsize=TICK_FONT_SIZE)
+        axes.grid(visible=False)
+        axes.spines[:].set_visible(False)
     x_title = _annotate(figure, grid, layout)
     _draw_colour_bar(figure, grid, layout)
     _resize_to_panels(figure, grid, layout)
@@ -70,19 +76,6 @@ def draw_map(map_: SuccessMap, link: CellLink = lambda _cell: "") -> Figure:
             cell = map_.cell(row, column, y_label, x_label)
             _draw_cell(grid[i][j], x, y, cell, layout.cell, link)
     return figure
-
-
-def _prepare_panel(axes: Axes, layout: MapLayout) -> None:
-    """Set limits, ticks and style of a panel."""
-    _, _, ys, xs = layout.levels
-    axes.set(xlim=(-0.5, len(xs) - 0.5), ylim=(-0.5, len(ys) - 0.5))
-    axes.set_xticks(
-        list(layout.x_ticks), layout.x_ticks.values(), rotation=90 if layout.rotate_x_labels else 0
-    )
-    axes.set_yticks(list(layout.y_ticks), layout.y_ticks.values())
-    axes.tick_params(length=0, labelsize=TICK_FONT_SIZE)
-    axes.grid(visible=False)
-    axes.spines[:].set_visible(False)
 
 
 def _draw_cell(

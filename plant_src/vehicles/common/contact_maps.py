@@ -101,29 +101,21 @@ class FreeContactMaps:
         state, end = arguments["state"], predicted_state(self.model, arguments)
         twist = mean_twist(state, end, arguments["step_size"])
         inertia = self.rigid_body(arguments["constants"]).inertia_in_world(state[3:7])
+        # the surface can reach the centre of mass from its level at the start of the step
+        names = [variable.name for variable in self.model.elements("input")]
+        environment = [name for name in names if name in ENVIRONMENT_INPUTS]
+        level = arguments["environment_inputs"][environment.index("water_level")]
+        speed = MAX_SURFACE_SPEED + ca.norm_2(end[7:10])
+        may_be_in_water = end[2] < level + arguments["step_size"] * speed
         return predict_function(
             arguments,
             end,
             twist,
             ca.vertcat(state[0:3], end[0:3]),
-            ca.logic_or(self._may_be_in_water(end, arguments), is_upside_down(end[3:7])),
+            ca.logic_or(may_be_in_water, is_upside_down(end[3:7])),
             compensating_torque=gyroscopic_torque(inertia, twist[3:6]),
             bullet_pose=principal_pose(state, arguments["principal_axes"]),
         )
-
-    def _may_be_in_water(self, end: ca.SX, arguments: Symbols) -> ca.SX:
-        """Return whether the surface can reach the centre of mass in a step.
-
-        Its level is that at the start of the step.
-        """
-        environment = [
-            variable.name
-            for variable in self.model.elements("input")
-            if variable.name in ENVIRONMENT_INPUTS
-        ]
-        level = arguments["environment_inputs"][environment.index("water_level")]
-        speed = MAX_SURFACE_SPEED + ca.norm_2(end[7:10])
-        return end[2] < level + arguments["step_size"] * speed
 
     def _correct_function(self) -> ca.Function:
         arguments = correct_symbols(self.model)

@@ -199,6 +199,9 @@ WORLD_OUTPUTS = (
     _flag("ditched", "centre of mass below the water; stays true"),
 )
 
+#: all outputs of a vessel
+VESSEL_OUTPUTS = (*MOTION_OUTPUTS, *DECK_OUTPUTS, *WORLD_OUTPUTS)
+
 
 def inertia_variables(mass: float, inertia: np.ndarray, mass_text: str) -> tuple[Variable, ...]:
     """Return the parameters `mass` (kg) and `inertia.*` (kg m2, centre of mass, body frame)."""
@@ -228,12 +231,12 @@ CURRENT_INPUTS = vector_variables(
 WAVE_GAIN_INPUT = (
     scalar_variable("wave_gain", "1", "factor on the amplitudes of all waves", start=1.0),
 )
-GROUND_DISTANCE_INPUT = (
+#: the same of vessels in waves
+FLOATING_INPUTS = (*WIND_INPUTS, *CURRENT_INPUTS, *WAVE_GAIN_INPUT)
+GROUND_INPUTS = (
     scalar_variable(
         "ground_distance", "m", "height of the rotor centre above the surface below", start=1e3
     ),
-)
-GROUND_SHARE_INPUT = (
     scalar_variable("ground_share", "1", "share of the rotors' area above this surface", start=1.0),
 )
 WATER_LEVEL_INPUT = (
@@ -246,8 +249,7 @@ ENVIRONMENT_INPUTS = frozenset(
         *WIND_INPUTS,
         *CURRENT_INPUTS,
         *WAVE_GAIN_INPUT,
-        *GROUND_DISTANCE_INPUT,
-        *GROUND_SHARE_INPUT,
+        *GROUND_INPUTS,
         *WATER_LEVEL_INPUT,
     )
 )

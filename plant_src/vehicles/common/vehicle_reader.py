@@ -465,16 +465,17 @@ class VehicleReader(QuantityReader, Generic[_Vehicle]):
         """Read the label of an element; by default its kind and number."""
         return self.text(data.get("label", f"{kind} {int(path[-1]) + 1}"), (*path, "label"))
 
-    def elements(self, data: Mapping[str, Any], key: str) -> list[tuple[int, Any]]:
-        """Read a list with at least one element; return its elements with their indices."""
+    def elements(self, data: Mapping[str, Any], key: str) -> list[tuple[JsonPath, Any]]:
+        """Read a list with at least one element; return its elements with their paths."""
         value = data.get(key, [{}])
         if not isinstance(value, list) or not value:
             self.add_problem((key,), f"found {value!r}, expected a list with at least one element")
             return []
-        return list(enumerate(value)) if key in data else []
+        return [((key, str(i)), each) for i, each in enumerate(value)] if key in data else []
 
-    def read_inertia(self, value: Any) -> np.ndarray:
+    def read_inertia(self, data: Mapping[str, Any]) -> np.ndarray:
         """Read three moments of inertia, or three rows of a tensor."""
+        value = data.get("inertia", [1.0] * 3)
         return self.read_matrix(value, ("inertia",), "xyz", "kg.m2", ("xx", "yy", "zz"))
 
     def read_axis(self, value: Any, path: JsonPath) -> Vector:
@@ -488,9 +489,7 @@ class VehicleReader(QuantityReader, Generic[_Vehicle]):
 
     def read_boxes(self, data: Mapping[str, Any]) -> tuple[Collision, ...]:
         """Read the collision shape."""
-        return tuple(
-            self.read_box(box, ("boxes", str(i))) for i, box in self.elements(data, "boxes")
-        )
+        return tuple(self.read_box(box, path) for path, box in self.elements(data, "boxes"))
 
     def read_box(self, value: Any, path: JsonPath) -> Collision:
         """Read one box or convex piece of the collision shape."""

@@ -185,10 +185,10 @@ class MultirotorReader(VehicleReader[Airframe]):
         path = ("rotor",)
         values: dict[str, Any] = {
             "mass": self.entry(data, "mass", "kg", above=0.0),
-            "inertia": self.read_inertia(data.get("inertia", [1.0] * 3)),
+            "inertia": self.read_inertia(data),
             "rotors": [
-                self.read_rotor(common, rotor, ("rotors", str(i)))
-                for i, rotor in self.elements(data, "rotors")
+                self.read_rotor(common, rotor, place)
+                for place, rotor in self.elements(data, "rotors")
             ],
             "max_rotor_speed": self.entry(common, "max_speed", "rad/s", path=path, above=0.0),
             "rotor_radius": self.entry(common, "radius", "m", path=path, above=0.0),

@@ -35,10 +35,8 @@ a rotor have the coefficients 0.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
-from itertools import chain
 from typing import NamedTuple
 
 import casadi as ca
@@ -94,11 +92,6 @@ class SpinningRotors(NamedTuple):
     momentum_rate: ca.SX
 
 
-#: function of (state, rotors, reductions of the inflow, inputs, constants) to the rate of the
-#: rigid-body states
-BodyRate = Callable[[ca.SX, SpinningRotors, ca.SX, NamedValues, NamedValues], ca.SX]
-
-
 @dataclass(frozen=True)
 class MultirotorEquations:
     """Equations of an airframe; the vectors hold the variables of `interface.variables` in order.
@@ -148,12 +141,6 @@ class MultirotorEquations:
             * ca.repmat(turning, 3, 1),
         }
 
-    @cached_property
-    def input_names(self) -> list[str]:
-        """Names of the scalar inputs."""
-        inputs = variables_of(self.variables, "input")
-        return [*chain.from_iterable(variable.scalar_names for variable in inputs)]
-
     def _inputs(self, vector: ca.SX) -> NamedValues:
         return values_by_name(vector, variables_of(self.variables, "input"))
 
@@ -193,18 +180,16 @@ class MultirotorEquations:
         return ca.vertcat(normalised_state(end), speed)
 
     def step_with_effects(
-        self, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX
+        self,
+        state: ca.SX,
+        inputs: ca.SX,
+        constants: ca.SX,
+        step: ca.SX,
+        *,
+        in_water: bool = False,
     ) -> ca.SX:
-        """Return the state after a step (s) in air with all effects."""
-        return self._step(self._body_rate, state, inputs, constants, step)
-
-    def step_in_water(self, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX) -> ca.SX:
-        """Return the state after a step (s) with all effects and the loads of water."""
-        return self._step(self._rate_in_water, state, inputs, constants, step)
-
-    def _step(
-        self, body_rate: BodyRate, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX
-    ) -> ca.SX:
+        """Return the state after a step (s) with all effects, in air or with the loads of water."""
+        body_rate = self._rate_in_water if in_water else self._body_rate
         given, known = self._inputs(inputs), self.constants.by_name(constants)
         target = self._commanded_speeds(given, known)
         start, middle, end = lagging_speeds(
@@ -270,7 +255,9 @@ def free_step(equations: MultirotorEquations) -> Callee:
 
     Its C code calls the function for the effects that are on and the water.
     """
-    inputs, names = equations.input_names, list[str]()
+    inputs, names = list[str](), list[str]()
+    for variable in variables_of(equations.variables, "input"):
+        inputs += variable.scalar_names
     for name, (rows, columns) in equations.constants.shapes.items():
         names += [name] * rows * columns
     state_count = len(states(equations.slots))
@@ -278,7 +265,9 @@ def free_step(equations: MultirotorEquations) -> Callee:
     arguments = [*create_symbols(**sizes).values()]
     plain = ca.Function("plain_step", arguments, [equations.step_without_effects(*arguments)])
     full = ca.Function("step_with_effects", arguments, [equations.step_with_effects(*arguments)])
-    wet = ca.Function("step_in_water", arguments, [equations.step_in_water(*arguments)])
+    wet = ca.Function(
+        "step_in_water", arguments, [equations.step_with_effects(*arguments, in_water=True)]
+    )
     either = ca.Function("free_step", arguments, [full(*arguments)], {"never_inline": True})
     effects = [k for k, name in enumerate(names) if name.partition(".")[0] in _EFFECTS]
     body = _FREE_STEP_C % {

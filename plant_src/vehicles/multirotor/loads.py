@@ -144,8 +144,30 @@ class RotorFunctions:
 
     @cached_property
     def inflow_reductions(self) -> Callee:
-        """Reductions of the inflow by the ground effect."""
-        return create_reductions(self.slots)
+        """Relative reduction of each hovering rotor's inflow by the ground effect, not limited yet.
+
+        Its arguments are (height of the rotor centre above the surface, rotor radius, number of
+        rotors) and x and y of the hubs (m), each of the shape (slots,). Its result has the shape
+        (slots,); only the elements with a rotor are of use.
+        """
+        common, x, y = (
+            ca.SX.sym("common", 3),
+            ca.SX.sym("x", self.slots),
+            ca.SX.sym("y", self.slots),
+        )
+        height, radius, count = ca.vertsplit(common)
+        z = ca.fmax(height, MIN_HEIGHT_RATIO * radius)
+        reductions = []
+        for i in range(self.slots):
+            reduction = ca.SX(0)
+            for j in range(self.slots):
+                d2 = (x[i] - x[j]) ** 2 + (y[i] - y[j]) ** 2 + 4 * z**2
+                reduction += ca.if_else(count > j, radius**2 / 2 * z / (d2 * ca.sqrt(d2)), 0)
+            reductions.append(reduction)
+        function = ca.Function("inflow_reductions", [common, x, y], [ca.vertcat(*reductions)])
+        return Callee(
+            function, _REDUCTIONS_C % {"slots": self.slots, "min_ratio": MIN_HEIGHT_RATIO}
+        )
 
     @cached_property
     def still_air_load(self) -> Callee:
@@ -213,33 +235,6 @@ def gyroscopic_torque(rates: ca.SX, momentum: ca.SX, momentum_rate: ca.SX) -> ca
         momentum_rate: Its time derivative in the body frame (N m).
     """
     return -(ca.cross(rates, momentum) + momentum_rate)
-
-
-def create_reductions(slots: int) -> Callee:
-    """Create the function of the relative reduction of each hovering rotor's inflow.
-
-    It is not limited yet.
-
-    Args:
-        slots: Number of elements of the arrays of rotors.
-
-    Returns:
-        Function of (height of the rotor centre above the surface, rotor radius, number of rotors)
-        and x and y of the hubs (m), each of the shape (slots,). Its result has the shape (slots,);
-        only the elements with a rotor are of use.
-    """
-    common, x, y = ca.SX.sym("common", 3), ca.SX.sym("x", slots), ca.SX.sym("y", slots)
-    height, radius, count = ca.vertsplit(common)
-    z = ca.fmax(height, MIN_HEIGHT_RATIO * radius)
-    reductions = []
-    for i in range(slots):
-        reduction = ca.SX(0)
-        for j in range(slots):
-            d2 = (x[i] - x[j]) ** 2 + (y[i] - y[j]) ** 2 + 4 * z**2
-            reduction += ca.if_else(count > j, radius**2 / 2 * z / (d2 * ca.sqrt(d2)), 0)
-        reductions.append(reduction)
-    function = ca.Function("inflow_reductions", [common, x, y], [ca.vertcat(*reductions)])
-    return Callee(function, _REDUCTIONS_C % {"slots": slots, "min_ratio": MIN_HEIGHT_RATIO})
 
 
 _REDUCTIONS_C = """{

@@ -6,15 +6,11 @@ from cosim.core.component import Variable
 from cosim.core.units import parse_unit
 
 from ..common.interface import (
-    CURRENT_INPUTS,
-    DECK_OUTPUTS,
     EXTERNAL_LOADS,
     FLOATING_INITIAL_PARAMETERS,
-    MOTION_OUTPUTS,
-    WAVE_GAIN_INPUT,
+    FLOATING_INPUTS,
+    VESSEL_OUTPUTS,
     WAVE_PARAMETERS,
-    WIND_INPUTS,
-    WORLD_OUTPUTS,
     initial_variables,
     parameter,
 )
@@ -39,15 +35,17 @@ PROPELLER_TIME_CONSTANT = parameter(
     "propeller_time_constant", "s", 0.1, "time constant of the propeller speeds; 0: no lag", 0.0
 )
 
-PARAMETERS = (
+VARIABLES = (
     *initial_variables("xy", "uvw", "pqr"),
     *FLOATING_INITIAL_PARAMETERS,
     *PAYLOAD_PARAMETERS,
     PROPELLER_TIME_CONSTANT,
     *WAVE_PARAMETERS,
+    PROPELLER_SPEED,
+    *EXTERNAL_LOADS,
+    *FLOATING_INPUTS,
+    *VESSEL_OUTPUTS,
 )
-INPUTS = (PROPELLER_SPEED, *EXTERNAL_LOADS, *WIND_INPUTS, *CURRENT_INPUTS, *WAVE_GAIN_INPUT)
-VARIABLES = (*PARAMETERS, *INPUTS, *MOTION_OUTPUTS, *DECK_OUTPUTS, *WORLD_OUTPUTS)
 
 #: actuator states
 PROPELLER_STATES = ("propeller_speed[1]", "propeller_speed[2]")

@@ -8,12 +8,10 @@ from cosim.core.component import Variable
 
 from ..common.interface import (
     CURRENT_INPUTS,
-    DECK_OUTPUTS,
     EXTERNAL_LOADS,
-    MOTION_OUTPUTS,
     PLANAR_STATES,
+    VESSEL_OUTPUTS,
     WIND_INPUTS,
-    WORLD_OUTPUTS,
     element_states,
     initial_variables,
     matrix_parameter,
@@ -55,9 +53,7 @@ def variables(vessel: PlanarVessel, slots: tuple[int, int] | None = None) -> tup
         *actuator_inputs(vessel.propellers, vessel.rudders, slots),
         *WIND_INPUTS,
         *CURRENT_INPUTS,
-        *MOTION_OUTPUTS,
-        *DECK_OUTPUTS,
-        *WORLD_OUTPUTS,
+        *VESSEL_OUTPUTS,
     )
 
 

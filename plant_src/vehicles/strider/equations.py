@@ -88,17 +88,14 @@ def air_drag(u: ca.SX, v: ca.SX) -> ca.SX:
 
 
 def hull_constants(parameters: NamedValues) -> dict[str, ca.SX]:
-    """Return the constants of resistance and propeller race."""
-    return {
-        "resistance": parameters["resistance"],
-        "race_factor": race_factor(parameters["propeller_diameter"]),
-    }
+    """Return the constants of resistance and propeller race.
 
-
-def race_factor(diameter: ca.SX) -> ca.SX:
-    """Return 2 / (rho A) (m2/s2/N) of a propeller with a diameter (m), 0 for the diameter 0."""
+    The race factor is 2 / (rho A) (m2/s2/N), 0 for a propeller with the diameter 0.
+    """
+    diameter = parameters["propeller_diameter"]
     area = math.pi / 4 * diameter * diameter
-    return ca.if_else(area > 0, 2 / p.WATER_DENSITY / ca.fmax(area, 1e-9), 0)
+    factor = ca.if_else(area > 0, 2 / p.WATER_DENSITY / ca.fmax(area, 1e-9), 0)
+    return {"resistance": parameters["resistance"], "race_factor": factor}
 
 
 def race_velocity_squared(thrust: ca.SX, factor: ca.SX) -> ca.SX:
@@ -109,7 +106,7 @@ def race_velocity_squared(thrust: ca.SX, factor: ca.SX) -> ca.SX:
 
     Args:
         thrust: Thrust (N).
-        factor: Value of `race_factor` (m2/s2/N).
+        factor: Constant "race_factor" (m2/s2/N).
     """
     return factor * ca.fmax(thrust, 0)
 
@@ -134,14 +131,6 @@ def rudder_loads(u: ca.SX, v: ca.SX, r: ca.SX, race: ca.SX, rudder_angle: ca.SX)
     return ca.vertcat(ahead, abeam, -p.RUDDER_ARM * abeam)
 
 
-def initial_state(constants: ca.SX) -> ca.SX:
-    """Return the state.
-
-    The first constants are position, yaw angle, velocity and yaw rate in the order of the state.
-    """
-    return constants[: len(PLANAR_STATES)]
-
-
 def observe(state: ca.SX) -> ca.SX:
     """Return the motion outputs of the vessel and of its landing deck."""
     return planar_maps.planar_outputs(state, ca.SX(p.CENTRE_OF_MASS_HEIGHT), ca.SX(p.DECK_CENTRE))
@@ -160,7 +149,8 @@ def model() -> ContinuousModel:
         "Strider V1.0 catamaran on calm water",
         VARIABLES,
         PLANAR_STATES,
-        initial_state,
+        # the first constants are position, yaw angle, velocity and yaw rate, as in the state
+        lambda constants: constants[: len(PLANAR_STATES)],
         lambda state, inputs, constants: rate(
             state, values_by_name(inputs, INPUTS), CONSTANTS.by_name(constants)
         ),

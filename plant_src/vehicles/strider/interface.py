@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from ..common.interface import (
     CURRENT_INPUTS,
-    DECK_OUTPUTS,
     EXTERNAL_LOADS,
-    MOTION_OUTPUTS,
+    VESSEL_OUTPUTS,
     WIND_INPUTS,
-    WORLD_OUTPUTS,
     initial_variables,
     parameter,
     scalar_variable,
@@ -51,7 +49,5 @@ VARIABLES = (
     *initial_variables("xy", "uv", "r"),
     *HULL_PARAMETERS,
     *INPUTS,
-    *MOTION_OUTPUTS,
-    *DECK_OUTPUTS,
-    *WORLD_OUTPUTS,
+    *VESSEL_OUTPUTS,
 )

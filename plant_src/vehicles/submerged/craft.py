@@ -154,10 +154,10 @@ class SubmergedReader(VehicleReader[Craft]):
                 for matrix in MATRICES
             },
             "mass": self.entry(data, "mass", "kg", above=0.0),
-            "inertia": self.read_inertia(data.get("inertia", [1.0] * 3)),
+            "inertia": self.read_inertia(data),
             "thrusters": [
-                self.read_thruster(common, each, ("thrusters", str(i)))
-                for i, each in self.elements(data, "thrusters")
+                self.read_thruster(common, each, place)
+                for place, each in self.elements(data, "thrusters")
             ],
         }
 

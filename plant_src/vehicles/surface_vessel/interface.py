@@ -5,16 +5,12 @@ from __future__ import annotations
 from cosim.core.component import Variable
 
 from ..common.interface import (
-    CURRENT_INPUTS,
-    DECK_OUTPUTS,
     EXTERNAL_LOADS,
     FLOATING_INITIAL_PARAMETERS,
-    MOTION_OUTPUTS,
+    FLOATING_INPUTS,
+    VESSEL_OUTPUTS,
     VESSEL_STATES,
-    WAVE_GAIN_INPUT,
     WAVE_PARAMETERS,
-    WIND_INPUTS,
-    WORLD_OUTPUTS,
     attribute_parameters,
     element_states,
     inertia_variables,
@@ -54,12 +50,8 @@ def variables(vessel: SurfaceVessel, slots: tuple[int, int] | None = None) -> tu
         *WAVE_PARAMETERS,
         *EXTERNAL_LOADS,
         *actuator_inputs(vessel.propellers, vessel.rudders, slots),
-        *WIND_INPUTS,
-        *CURRENT_INPUTS,
-        *WAVE_GAIN_INPUT,
-        *MOTION_OUTPUTS,
-        *DECK_OUTPUTS,
-        *WORLD_OUTPUTS,
+        *FLOATING_INPUTS,
+        *VESSEL_OUTPUTS,
     )
 
 

@@ -257,7 +257,7 @@ class SurfaceVesselReader(BoatReader[SurfaceVessel]):
         """Read the attributes of the vessel, and the collision shape."""
         return {
             **self.read_boat(data, self.read_boxes(data)),
-            "inertia": self.read_inertia(data.get("inertia", [1.0] * 3)),
+            "inertia": self.read_inertia(data),
             "quadratic_damping": self.read_nu_matrix(data, "quadratic_damping", [0.0] * 6),
             "hull": self.read_hull(data.get("hull")),
         }

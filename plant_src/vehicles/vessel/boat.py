@@ -191,8 +191,8 @@ class BoatReader(VehicleReader[_Boat]):
             data.get("propeller", {}), ("propeller",), (), tuple(_PROPELLER_QUANTITIES)
         )
         return [
-            self.read_propeller(common, each, ("propellers", str(i)))
-            for i, each in self.elements(data, "propellers")
+            self.read_propeller(common, each, path)
+            for path, each in self.elements(data, "propellers")
         ]
 
     def read_propeller(self, common: Mapping[str, Any], value: Any, path: JsonPath) -> Propeller:
@@ -220,7 +220,7 @@ class BoatReader(VehicleReader[_Boat]):
     def read_rudders(self, data: Mapping[str, Any]) -> list[Rudder]:
         """Read all rudders; a vessel may have none."""
         given = self.elements(data, "rudders") if data.get("rudders") != [] else []
-        return [self.read_rudder(each, ("rudders", str(i))) for i, each in given]
+        return [self.read_rudder(each, path) for path, each in given]
 
     def read_rudder(self, value: Any, path: JsonPath) -> Rudder:
         """Read one rudder."""

@@ -79,7 +79,10 @@ class PlanarContactMaps:
         constants, load = arguments["constants"], arguments["vertical_load"]
         body = self.body(constants)
         rates = (end[0:3] - state[0:3]) / arguments["step_size"]
-        lift = _minmod(load[0], load[1]) / body.mass
+        # the weaker of two impulses, 0 for different signs
+        last, before, _ = ca.vertsplit(load)
+        weaker = ca.if_else(ca.fabs(last) < ca.fabs(before), last, before)
+        lift = ca.if_else(last * before > 0, weaker, 0) / body.mass
         positions = [self.observe(x, constants)[0:3] for x in (state, end)]
         return predict_function(
             arguments,
@@ -121,11 +124,6 @@ def _bullet_pose(state: ca.SX, body: PlanarBody) -> ca.SX:
 
 def _planar_twist(horizontal: ca.SX, vertical: ca.SX, yaw_rate: ca.SX) -> ca.SX:
     return ca.vertcat(horizontal, vertical, 0, 0, yaw_rate)
-
-
-def _minmod(a: ca.SX, b: ca.SX) -> ca.SX:
-    """Return the number with the smaller magnitude, or zero for different signs."""
-    return ca.if_else(a * b > 0, ca.if_else(ca.fabs(a) < ca.fabs(b), a, b), 0)
 
 
 def _planar_rotation(yaw: ca.SX) -> ca.SX:

@@ -190,7 +190,11 @@ class FloatingContactMaps:
         impulse = arguments["contact_impulse"]
         hull, attitude = self.vessel.hull_with(constants), kinematics.rotation_matrix(state[3:7])
         load = _impulse_about_centre(hull, attitude, impulse) / step
-        end = predicted_state(self.model, arguments, self._loaded(arguments["inputs"], load))
+        inputs = arguments["inputs"]
+        first = [each.name for each in self.model.elements("input")].index("external_force.x")
+        last = first + TWIST_SIZE
+        loaded = ca.vertcat(inputs[:first], inputs[first:last] + load, inputs[last:])
+        end = predicted_state(self.model, arguments, loaded)
         moved = mean_twist(state, end, step)
         body = self.body(constants)
         inertia = _inertia_in_world(body, attitude)
@@ -231,13 +235,6 @@ class FloatingContactMaps:
         return impulse_correct_function(
             arguments, impulse, magnitude, corrected, mean_nu, hull.observe
         )
-
-    def _loaded(self, inputs: ca.SX, load: ca.SX) -> ca.SX:
-        """Return the inputs with a load (6) added to the external loads."""
-        names = [variable.name for variable in self.model.elements("input")]
-        first = names.index("external_force.x")
-        end = first + TWIST_SIZE
-        return ca.vertcat(inputs[:first], inputs[first:end] + load, inputs[end:])
 
 
 def _inertia_in_world(body: BulletBody, attitude: ca.SX) -> ca.SX:

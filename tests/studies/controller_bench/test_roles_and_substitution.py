@@ -59,6 +59,13 @@ def test_every_shipped_controller_of_a_role_fits_it(name):
         assert interface_problems(role, read_interface(parse_source(str(path)))) == [], path
 
 
+def write(substitution, folder):
+    """Write the changed scenario and its nested systems; return the path of the scenario."""
+    path = substitution.substitute(folder)
+    substitution.write_files()
+    return path
+
+
 @pytest.mark.parametrize("name", role_names())
 def test_a_shipped_controller_can_replace_itself_in_a_scenario(name, tmp_path):
     """The controllers of performance_5 are in nested systems of two levels."""
@@ -66,7 +73,7 @@ def test_a_shipped_controller_can_replace_itself_in_a_scenario(name, tmp_path):
     candidate = parse_source(str(min(role.controllers)))
     scenario = ROOT / f"scenarios/{SCENARIOS.get(name, 'performance_5')}.json"
     substitution = ControllerSubstitution(role, candidate, read_interface(candidate), scenario)
-    path = substitution.write(tmp_path)
+    path = write(substitution, tmp_path)
     assert path
     assert len(substitution.replaced_components) == 1
     prepared = load(path)
@@ -85,9 +92,12 @@ def test_a_controller_with_only_the_variables_of_the_role_is_accepted_for_a_flee
     (tmp_path / "bare.py").write_text(BARE)
     candidate = parse_source(f"{tmp_path / 'bare.py'}:Bare")
     scenario = ROOT / "scenarios/fleet_survey.json"
-    path = ControllerSubstitution(
-        read_role("uav_controller"), candidate, read_interface(candidate), scenario
-    ).write(tmp_path / "new")
+    path = write(
+        ControllerSubstitution(
+            read_role("uav_controller"), candidate, read_interface(candidate), scenario
+        ),
+        tmp_path / "new",
+    )
     load(path).free()
 
 
@@ -96,7 +106,9 @@ def test_a_scenario_without_the_role_is_not_written(tmp_path):
     candidate = parse_source(str(min(role.controllers)))
     scenario = ROOT / "scenarios/demo3_inverse_kinematics.json"
     assert (
-        ControllerSubstitution(role, candidate, read_interface(candidate), scenario).write(tmp_path)
+        write(
+            ControllerSubstitution(role, candidate, read_interface(candidate), scenario), tmp_path
+        )
         is None
     )
     assert list(tmp_path.iterdir()) == []
@@ -108,15 +120,15 @@ def test_other_json_is_skipped_and_an_invalid_scenario_is_refused(tmp_path):
     shape = read_interface(candidate)
     (tmp_path / "data.json").write_text('{"checks": []}')
     assert (
-        ControllerSubstitution(role, candidate, shape, tmp_path / "data.json").write(
-            tmp_path / "out"
+        write(
+            ControllerSubstitution(role, candidate, shape, tmp_path / "data.json"), tmp_path / "out"
         )
         is None
     )
     (tmp_path / "bad.json").write_text('{"name": "bad", "components": {"a": {"fmu": 5}}}')
     with pytest.raises(InputError, match=r"bad.json:1:.*components.a.fmu"):
-        ControllerSubstitution(role, candidate, shape, tmp_path / "bad.json").write(
-            tmp_path / "out"
+        write(
+            ControllerSubstitution(role, candidate, shape, tmp_path / "bad.json"), tmp_path / "out"
         )
 
 
@@ -144,7 +156,7 @@ def test_settings_are_listed_with_the_names_of_the_candidate(tmp_path):
     substitution = ControllerSubstitution(
         read_role("uav_controller"), candidate, read_interface(candidate), scenario
     )
-    path = substitution.write(tmp_path / "out")
+    path = write(substitution, tmp_path / "out")
     assert path is not None
     given = json.loads(scenario.read_text())["components"]["demo1"]["parameters"]["landing_time"]
     (settings,) = substitution.applied_settings.values()
@@ -162,7 +174,7 @@ def test_ports_without_a_target_are_removed_with_their_settings(tmp_path):
     substitution = ControllerSubstitution(
         read_role("uav_controller"), candidate, read_interface(candidate), scenario
     )
-    path = substitution.write(tmp_path / "out")
+    path = write(substitution, tmp_path / "out")
     assert path is not None
     assert ("demo1.landing_time", "vtol.landing_time") in {
         (each.variable, each.lacking) for each in substitution.omissions
@@ -184,8 +196,9 @@ def test_a_parameter_of_the_role_may_be_declared_without_its_prefix(tmp_path):
     )
     shape = candidate_of(outputs=role.outputs, parameters=["landing_time"])
     demo1, performance_5 = (
-        ControllerSubstitution(role, candidate, shape, ROOT / f"scenarios/{name}.json").write(
-            tmp_path / name
+        write(
+            ControllerSubstitution(role, candidate, shape, ROOT / f"scenarios/{name}.json"),
+            tmp_path / name,
         )
         for name in ("demo1_box", "performance_5")
     )
@@ -223,9 +236,10 @@ def test_changed_systems_of_different_scenarios_are_separate_files(tmp_path):
     shape, role = read_interface(candidate), read_role("uav_position")
     systems = []
     for name in ("demo1_box", "demo2_sweep"):
-        path = ControllerSubstitution(
-            role, candidate, shape, ROOT / f"scenarios/{name}.json"
-        ).write(tmp_path)
+        path = write(
+            ControllerSubstitution(role, candidate, shape, ROOT / f"scenarios/{name}.json"),
+            tmp_path,
+        )
         assert path is not None
         systems.append(json.loads(path.read_text())["components"]["uav"]["system"])
     assert systems[0] != systems[1]

@@ -15,7 +15,6 @@ from .archive import Archive, open_regular_file
 from .binary import check_binary
 from .findings import (
     DESCRIPTION_FILE,
-    RUN_WARNINGS,
     FatalFindingError,
     Finding,
     raise_errors,
@@ -24,18 +23,6 @@ from .model_description import Interface, ModelDescription, Violation, to_findin
 from .platforms import current_platform
 from .xml import parse_xml
 from .xml_reader import check_repeated_elements, read_model
-
-__all__ = [
-    "DESCRIPTION_FILE",
-    "RUN_WARNINGS",
-    "Examination",
-    "Finding",
-    "Interface",
-    "examine",
-    "extract",
-    "open_regular_file",
-    "raise_errors",
-]
 
 _MAX_FINDINGS_PER_CHECK = 100
 #: folders that a running FMU does not use

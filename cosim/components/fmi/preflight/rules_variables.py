@@ -24,17 +24,11 @@ from .model_description import (
 )
 
 _ATTRIBUTE_VALUES = {
-    "causality": (
-        "parameter",
-        "calculatedParameter",
-        "input",
-        "output",
-        "local",
-        "independent",
-        "structuralParameter",
-    ),
-    "variability": ("constant", "fixed", "tunable", "discrete", "continuous"),
-    "initial": ("exact", "approx", "calculated"),
+    "causality": """
+        parameter calculatedParameter input output local independent structuralParameter
+    """,
+    "variability": "constant fixed tunable discrete continuous",
+    "initial": "exact approx calculated",
 }
 _NAME_PATTERN = (
     r"(?:[A-Za-z_][A-Za-z0-9_]*|'(?:[A-Za-z0-9_!#$%&()*+,\-./:;<>=?@\[\]^{}|~ "
@@ -95,7 +89,8 @@ def check_kinds(model: ModelDescription) -> Iterator[Violation]:
 
 
 def _check_attribute_values(variable: ModelVariable) -> Iterator[Violation]:
-    for attribute, words in _ATTRIBUTE_VALUES.items():
+    for attribute, allowed in _ATTRIBUTE_VALUES.items():
+        words = allowed.split()
         word = variable.attributes.get(attribute, words[0])
         if word not in words:
             text = f'found {attribute}="{word}"{did_you_mean(word, words)}'

@@ -14,7 +14,7 @@ from zipfile import ZipFile
 import pytest
 
 from cosim.components.fmi import FmuFile
-from cosim.components.fmi.preflight import Finding
+from cosim.components.fmi.preflight.findings import Finding
 from cosim.components.fmi.preflight.validation import validate_fmu
 from cosim.core.errors import InputError
 

@@ -6,8 +6,8 @@ import struct
 import pytest
 from bad_fmus import read_members
 
-from cosim.components.fmi.preflight import examine, open_regular_file, pe
-from cosim.components.fmi.preflight.archive import Archive
+from cosim.components.fmi.preflight import examine, pe
+from cosim.components.fmi.preflight.archive import Archive, open_regular_file
 from cosim.components.fmi.preflight.binary import check_binary
 from cosim.components.fmi.preflight.functions import standard_functions
 from cosim.components.fmi.preflight.platforms import FmuPlatform, InvalidLibraryError
