@@ -64,11 +64,15 @@ def build(
     for source in selected:
         fmus = fmu_files(source, root)
         files = export_source(source, fmus)
-        entry = _manifest_entry(source, files, fmus, root)
+        entry = {
+            "sources": _file_hashes(files, root),
+            "fmus": _file_hashes(fmus.values(), root),
+            "tools": tool_versions(source),
+        }
         manifest = (manifest if sources is None else read_manifest(root)) | {
             source.manifest_key: entry
         }
-        _write_manifest(manifest, root)
+        write_file(root / MANIFEST, json.dumps(manifest, indent=1, sort_keys=True) + "\n")
         results.append(BuildResult(source.path, fmus))
         report(results[-1])
     return results
@@ -224,20 +228,6 @@ def read_manifest(root: Path) -> dict[str, Any]:
             Problem(f"is not valid JSON: {error}; remove it and run `cosim build`", str(path))
         ) from None
     return manifest
-
-
-def _write_manifest(manifest: Mapping[str, Any], root: Path) -> None:
-    write_file(root / MANIFEST, json.dumps(manifest, indent=1, sort_keys=True) + "\n")
-
-
-def _manifest_entry(
-    source: Source, files: Iterable[Path], fmus: Mapping[int, Path], root: Path
-) -> dict[str, Any]:
-    return {
-        "sources": _file_hashes(files, root),
-        "fmus": _file_hashes(fmus.values(), root),
-        "tools": tool_versions(source),
-    }
 
 
 def _file_hashes(files: Iterable[Path], root: Path) -> dict[str, str]:

@@ -163,18 +163,12 @@ def write_archive(files: Mapping[str, bytes], target: Path) -> Path:
     """
     with writing_atomically(target) as temporary, ZipFile(temporary, "w") as archive:
         for name in sorted(files):
-            archive.writestr(_member(name), files[name])
+            member = ZipInfo(name, _DATE)
+            member.create_system = _UNIX
+            member.external_attr = _REGULAR_FILE
+            member.compress_type = ZIP_DEFLATED
+            archive.writestr(member, files[name])
     return target
-
-
-def _member(name: str) -> ZipInfo:
-    member = ZipInfo(name, _DATE)
-    member.create_system, member.external_attr, member.compress_type = (
-        _UNIX,
-        _REGULAR_FILE,
-        ZIP_DEFLATED,
-    )
-    return member
 
 
 def content_token(parts: Iterable[bytes]) -> str:

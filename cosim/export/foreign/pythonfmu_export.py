@@ -215,11 +215,21 @@ def _complete_description(root: Element) -> None:
     """
     root.attrib.pop("generationDateAndTime", None)
     root.set("guid", "")
-    _define_units(root)
+    # `UnitDefinitions` follow `CoSimulation`, as the FMI 2.0 schema requires
+    names = {real.get("unit", "") for real in root.iter("Real")} - {""}
+    add_units(root, names)
+    if names:
+        definitions = root[-1]
+        root.remove(definitions)
+        root.insert([child.tag for child in root].index("CoSimulation") + 1, definitions)
     unknowns = []
     for index, variable in enumerate(root.iter("ScalarVariable"), start=1):
         if "variability" not in variable.attrib:
-            _set_default_variability(variable)
+            # FMI's default "continuous" is for variables of type Real, but not for parameters
+            if "arameter" in variable.get("causality", "local"):
+                variable.set("variability", "fixed")
+            elif variable.find("Real") is None:
+                variable.set("variability", "discrete")
         if _is_initial_unknown(variable.attrib):
             unknowns.append(index)
     structure = root.find("ModelStructure")
@@ -227,27 +237,6 @@ def _complete_description(root: Element) -> None:
         group = ElementTree.SubElement(structure, "InitialUnknowns")
         for index in unknowns:
             ElementTree.SubElement(group, "Unknown", index=str(index))
-
-
-def _define_units(root: Element) -> None:
-    """Insert `UnitDefinitions` after `CoSimulation`, as the FMI 2.0 schema requires."""
-    names = {real.get("unit", "") for real in root.iter("Real")} - {""}
-    add_units(root, names)
-    if names:
-        definitions = root[-1]
-        root.remove(definitions)
-        root.insert([child.tag for child in root].index("CoSimulation") + 1, definitions)
-
-
-def _set_default_variability(variable: Element) -> None:
-    """Set the variability where FMI's default "continuous" is not allowed.
-
-    For parameters and for types other than Real.
-    """
-    if "arameter" in variable.get("causality", "local"):
-        variable.set("variability", "fixed")
-    elif variable.find("Real") is None:
-        variable.set("variability", "discrete")
 
 
 def _is_initial_unknown(attributes: Mapping[str, str]) -> bool:

@@ -125,7 +125,15 @@ class _Replacement:
         ):
             return self._operator(node, tree)
         if is_clocked_when(tree, self._model):
-            return self._translate_when(node, tree)
+            return When(
+                (
+                    (
+                        self._condition(self._rate(node), True),
+                        self._translate(node, tree.branches[0][1]),
+                    ),
+                ),
+                tree.where,
+            )
         if not is_dataclass(tree) or isinstance(tree, type):
             return tree
         return replace(
@@ -134,17 +142,6 @@ class _Replacement:
                 field.name: self._translate(node, getattr(tree, field.name))
                 for field in fields(tree)
             },
-        )
-
-    def _translate_when(self, node: str, when: When) -> When:
-        return When(
-            (
-                (
-                    self._condition(self._rate(node), True),
-                    self._translate(node, when.branches[0][1]),
-                ),
-            ),
-            when.where,
         )
 
     def _rate(self, node: str) -> Rate:

@@ -224,7 +224,9 @@ def build_schedule(model: Model) -> Schedule:
         *(make_node(model, (statement,)) for statement in continuous),
     ]
     initial = _initial_nodes(model, conditions)
-    solved, initially_held = solve_initial_equations(model, assigned, continuous, _written(initial))
+    solved, initially_held = solve_initial_equations(
+        model, assigned, continuous, set[ScalarKey]().union(*(node.writes for node in initial))
+    )
     initial += [make_node(model, (statement,)) for statement in solved]
     for nodes, constant in ((events, held), (initial, initially_held)):
         separate = [
@@ -296,10 +298,6 @@ def _reinits(model: Model, conditions: WhenConditions) -> Body:
 
 def _as_assignment(node: Any) -> Any:
     return Assign(node.target, node.value, node.where) if isinstance(node, Reinit) else None
-
-
-def _written(nodes: Iterable[Node]) -> set[ScalarKey]:
-    return set[ScalarKey]().union(*(node.writes for node in nodes))
 
 
 def _event_nodes(model: Model, conditions: WhenConditions) -> Iterator[Node]:

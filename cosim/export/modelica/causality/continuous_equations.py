@@ -165,7 +165,9 @@ def match_equations(model: Model, assigned: Collection[str]) -> list[Assign]:
         if len(unmatched) == len(pending):
             _raise_unmatched([equation for _, equation in unmatched], model, defined)
         pending = unmatched
-    _check_complete(model, defined)
+    for variable in model.variables.values():
+        if not scalar_keys(model.variables, Name(variable.name)) <= set(defined):
+            raise_model_error(f"no equation gives {variable.name} a value", variable.where)
     return [matched[number] for number in sorted(matched)]
 
 
@@ -201,12 +203,6 @@ def _raise_unmatched(
         "no other equation defines",
         equation.where,
     )
-
-
-def _check_complete(model: Model, defined: Collection[ScalarKey]) -> None:
-    for variable in model.variables.values():
-        if not scalar_keys(model.variables, Name(variable.name)) <= set(defined):
-            raise_model_error(f"no equation gives {variable.name} a value", variable.where)
 
 
 def match_initial_equations(model: Model, assigned: Collection[str]) -> list[Assign]:

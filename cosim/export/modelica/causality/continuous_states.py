@@ -55,7 +55,11 @@ def introduce_derivatives(model: Model) -> Model:
     """
     der_calls = dict(_der_calls(model))
     for name, call in der_calls.items():
-        _check_state(model, name, call)
+        variable = model.variables.get(name)
+        if variable is None or not is_continuous(variable) or is_input(variable):
+            raise_model_error(
+                f"der({name}): {name} is not a continuous Real variable of the model", call.where
+            )
     states = tuple(name for name in model.variables if name in der_calls)
     derivatives = {
         derivative_name(name): derivative_variable(model.variables[name]) for name in states
@@ -86,14 +90,6 @@ def _der_argument(call: Builtin) -> Name | Index:
             call.where,
         )
     return argument
-
-
-def _check_state(model: Model, name: str, call: Builtin) -> None:
-    variable = model.variables.get(name)
-    if variable is None or not is_continuous(variable) or is_input(variable):
-        raise_model_error(
-            f"der({name}): {name} is not a continuous Real variable of the model", call.where
-        )
 
 
 def derivative_variable(state: Variable) -> Variable:
@@ -180,7 +176,19 @@ class _Reduction:
             if key in done:
                 continue
             done.add(key)
-            equations.append(self._differentiated(key))
+            equation = self._equation_of.get(key)
+            if equation is None:
+                raise_model_error(
+                    f"the derivative of {key[0]} is needed, but no equation gives it",
+                    self._model.variables[key[0]].where,
+                )
+            equations.append(
+                Equation(
+                    self._differentiate(equation.left),
+                    self._differentiate(equation.right),
+                    equation.where,
+                )
+            )
         states = tuple(name for name in self._model.states if name not in names)
         return replace(
             self._model, variables=self._variables, states=states, equations=tuple(equations)
@@ -199,18 +207,6 @@ class _Reduction:
                     "states",
                     equation.where,
                 )
-
-    def _differentiated(self, key: ScalarKey) -> Equation:
-        """Return the derivative of the equation that determines a variable."""
-        equation = self._equation_of.get(key)
-        if equation is None:
-            raise_model_error(
-                f"the derivative of {key[0]} is needed, but no equation gives it",
-                self._model.variables[key[0]].where,
-            )
-        return Equation(
-            self._differentiate(equation.left), self._differentiate(equation.right), equation.where
-        )
 
     def _derivative(self, reference: Name | Index) -> Expression | None:
         """Return the derivative of a variable with respect to time."""

@@ -238,7 +238,13 @@ class EquationSystem:
         jacobian = tuple(self._gradient(residual, keys) for residual in residuals)
         linear = scalars_read(self.model, jacobian).isdisjoint(keys)
         references = tuple(reference_of(key, self.model) for key in keys)
-        return Solve(references, residuals, jacobian, linear, _first_location(equations))
+        return Solve(
+            references,
+            residuals,
+            jacobian,
+            linear,
+            next((equation.where for equation in equations if equation.where), None),
+        )
 
     def _gradient(self, node: Expression, keys: Sequence[ScalarKey]) -> tuple[Expression, ...]:
         return tuple(self._derivative(node, key) for key in keys)
@@ -249,7 +255,3 @@ class EquationSystem:
             return Literal(1.0, "Real") if key in keys else None
 
         return Differentiation(self.model.functions, leaf)(node)
-
-
-def _first_location(equations: Sequence[Equation]) -> SourceLocation | None:
-    return next((equation.where for equation in equations if equation.where), None)

@@ -106,7 +106,11 @@ class WhenConditions:
 
         They are evaluated in place, in the order of the algorithm.
         """
-        used = {int(item.arguments[0].number) for item in walk(body) if _is_edge_flag(item)}
+        used = {
+            int(item.arguments[0].number)
+            for item in walk(body)
+            if is_call(item, "risen") and isinstance(item.arguments[0], Literal)
+        }
         found = [detector for detector in self.edge_detectors if detector.index in used]
         found = [
             detector for detector in found if variable_names(detector.condition) & set(assigned)
@@ -155,7 +159,3 @@ def _to_real(expression: Expression) -> Expression:
     return (
         Literal(float(expression.number), "Real") if isinstance(expression, Literal) else expression
     )
-
-
-def _is_edge_flag(node: Any) -> bool:
-    return is_call(node, "risen") and isinstance(node.arguments[0], Literal)

@@ -34,7 +34,8 @@ def declared_models(text: str) -> list[str]:
     >>> declared_models("partial block B end B;")
     []
     """
-    enclosing = _within(text)
+    found = re.search(r"^\s*within\s+([\w.]+)\s*;", text, re.MULTILINE)
+    enclosing = found[1].split(".") if found else []
     models = []
     for token in _TOKEN.finditer(text):
         if token["name"]:
@@ -46,11 +47,6 @@ def declared_models(text: str) -> list[str]:
         elif token["end"] and enclosing and token["end"] == enclosing[-1]:
             enclosing.pop()
     return models
-
-
-def _within(text: str) -> list[str]:
-    found = re.search(r"^\s*within\s+([\w.]+)\s*;", text, re.MULTILINE)
-    return found[1].split(".") if found else []
 
 
 def models_hint(name: str, path: Path) -> str:

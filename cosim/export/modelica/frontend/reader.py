@@ -108,6 +108,9 @@ class ModelReader(StatementReader):
         node = self.json["variables"][name]
         type_name = self.json["variable_type_names"][name]
         kind = self._type(self.json["effective_types"][str(node["type_id"])]["canonical_type"])
+        parts = name.split(".")
+        # the model itself, its records and connectors own the top-level variables
+        owners = (".".join(parts[:depth]) for depth in range(1, len(parts)))
         return Variable(
             name=name,
             type=kind,
@@ -120,7 +123,10 @@ class ModelReader(StatementReader):
             final=bool(self.json["variable_final_flags"].get(name)),
             fixed=_is_fixed(node["fixed"]),
             protected=node["is_protected"],
-            top_level=self._is_top_level(name),
+            top_level=(
+                parts[0] in self.json["top_level_connectors"]
+                or all(owner in self.json["record_instances"] for owner in owners)
+            ),
             unit=self._text(node["unit"]),
             quantity=self._text(node["quantity"]),
             description=self._text(node["description"]),
@@ -141,14 +147,6 @@ class ModelReader(StatementReader):
         kind = node["causality"]
         word = (kind if isinstance(kind, str) else split_tagged(kind)[0]).lower()
         return "local" if word == "empty" else word
-
-    def _is_top_level(self, name: str) -> bool:
-        """Return whether a variable belongs to the model itself, its records or connectors."""
-        parts = name.split(".")
-        owners = (".".join(parts[:depth]) for depth in range(1, len(parts)))
-        return parts[0] in self.json["top_level_connectors"] or all(
-            owner in self.json["record_instances"] for owner in owners
-        )
 
     def _text(self, node: Any) -> str:
         if node is None or isinstance(node, str):
@@ -377,12 +375,11 @@ def _unroll(family: Json) -> Iterator[tuple[int, Json]]:
     for number, (indices, body) in enumerate(product(product(*ranges), bodies)):
         yield (
             family["first_equation_index"] + number,
-            _substitute_indices(body, dict(zip(_index_names(binders), indices, strict=True))),
+            _substitute_indices(
+                body,
+                dict(zip([binder["display_name"] for binder in binders], indices, strict=True)),
+            ),
         )
-
-
-def _index_names(binders: list[Json]) -> list[str]:
-    return [binder["display_name"] for binder in binders]
 
 
 def _substitute_indices(node: Any, indices: Mapping[str, int]) -> Any:
