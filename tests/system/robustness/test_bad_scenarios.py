@@ -300,7 +300,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, probes: dict[int, Path]) ->
 def refused(folder: Path, text: str, words: str, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "scenario.json").write_text(text)
     begin = time.process_time()
-    code = cli._run_command_line(
+    code = cli.run_command_line(
         [
             "run",
             str(folder / "scenario.json"),

@@ -97,7 +97,7 @@ def alone(
         "--output-file",
         str(file),
     ]
-    assert cli._run_command_line([*words, *values, "--isolation", "none"]) == 0
+    assert cli.run_command_line([*words, *values, "--isolation", "none"]) == 0
     result = cosim.Result.from_csv(file)
     return {"time": result.time, **result.recording.columns}
 
