@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 from ..core.component import Variable
@@ -82,7 +83,7 @@ class VariableAccess:
             self._targets[name] = self._resolve(name, ("parameters", "inputs"))
         for target in self._targets[name]:
             component, variables = target.component, self._variables_of(target.component)
-            read = self._system.components[component].get
+            read = partial(self._read_now, run, component)
             try:
                 values = check_assignment(component, variables, target.prefix, value, True, read)
             except (UnknownNameError, ValueError) as error:
@@ -96,6 +97,11 @@ class VariableAccess:
             run.set_in_next_step(component, values)
             if len(self._targets[name]) == 1 and isinstance(value, list):
                 self._remember_reals(name, component, [variables[each] for each in values])
+
+    def _read_now(self, run: PlanRun, component: str, variable: str) -> Any:
+        """Return the value of a variable after all values that were set before."""
+        with run.accessing(component, "get"):
+            return self._system.components[component].get(variable)
 
     def _remember_reals(self, name: str, component: str, variables: Sequence[Variable]) -> None:
         """Remember real variables, or an array of them, which a list of numbers has set."""

@@ -95,6 +95,16 @@ def test_lists_of_numbers_are_checked_each_time_that_they_are_set(name):
         assert drone.get(name) == [1.0] * size
 
 
+def test_elements_of_an_array_that_are_set_one_after_the_other_are_all_kept():
+    system = {"a": {"fmu": "cosim:fmus/fmi3/ar_drone.fmu"}}
+    with cosim.load(
+        {"name": "x", "stop_time": 1, "step_size": 0.01, "components": system}
+    ) as drone:
+        for i in (1, 2, 4):
+            drone.set(f"a.rotor_speed[{i}]", 100.0 * i)
+        assert drone.get("a.rotor_speed") == [100.0, 200.0, drone.get("a.rotor_speed[3]"), 400.0]
+
+
 SULKING = """
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
 
