@@ -19,7 +19,8 @@ from ..model.syntax_tree import SourceLocation
 _TOKEN = re.compile(
     r'//[^\n]*|/\*.*?\*/|"(?:[^"\\]|\\.)*"|\bend\s+(?P<end>\w+)\s*;|'
     r"(?P<prefix>\b(?:partial|redeclare|replaceable)\s+)*"
-    r"\b(?P<kind>model|block|package|function|record|connector|class|type)\s+(?P<name>[A-Za-z_]\w*)(?P<short>\s*=)?",
+    r"\b(?P<kind>model|block|package|function|record|connector|class|type)\s+"
+    r"(?P<name>[A-Za-z_]\w*)(?P<short>\s*=)?",
     re.DOTALL,
 )
 _MODELS = ("model", "block")

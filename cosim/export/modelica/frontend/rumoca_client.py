@@ -114,7 +114,8 @@ def _read_messages(output: Any) -> list[dict[str, Any]]:
 
 
 _PART_TOKEN = re.compile(
-    r'(?P<comment>//[^\n]*|/\*.*?\*/)|(?P<string>"(?:[^"\\]|\\.)*")|(?P<word>[A-Za-z_]\w*)|(?P<symbol>:=|==|<=|>=|<>|\S)',
+    r'(?P<comment>//[^\n]*|/\*.*?\*/)|(?P<string>"(?:[^"\\]|\\.)*")|'
+    r"(?P<word>[A-Za-z_]\w*)|(?P<symbol>:=|==|<=|>=|<>|\S)",
     re.DOTALL,
 )
 _SECTIONS = ("equation", "algorithm")

@@ -60,10 +60,12 @@ _EXPECTED = re.compile(r"help: expected one of: (?P<tokens>.*)", re.DOTALL)
 
 #: words that are no names (Modelica Language Specification 3.6, section 2.3.3)
 _RESERVED = re.compile(
-    "algorithm|and|annotation|block|break|class|connect|connector|constant|constrainedby|der|discrete|each|else|elseif|"
-    "elsewhen|encapsulated|end|enumeration|equation|expandable|extends|external|false|final|flow|for|function|if|import|"
-    "impure|in|initial|inner|input|loop|model|not|operator|or|outer|output|package|parameter|partial|protected|public|pure|"
-    "record|redeclare|replaceable|return|stream|then|true|type|when|while|within"
+    "algorithm|and|annotation|block|break|class|connect|connector|constant|"
+    "constrainedby|der|discrete|each|else|elseif|elsewhen|encapsulated|end|enumeration|"
+    "equation|expandable|extends|external|false|final|flow|for|function|if|import|"
+    "impure|in|initial|inner|input|loop|model|not|operator|or|outer|output|package|"
+    "parameter|partial|protected|public|pure|record|redeclare|replaceable|return|stream|"
+    "then|true|type|when|while|within"
 )
 
 
