@@ -14,7 +14,7 @@ import numpy as np
 from cosim.core.component import Variable
 from cosim.core.errors import InputError, did_you_mean
 
-from .catalogue import models_of
+from .catalogue import Model, models_of
 from .environment import settings
 from .environment.sea import Sea
 from .environment.settings import EnvironmentSettings
@@ -28,7 +28,6 @@ from .placement import (
     read_surface,
 )
 from .vehicles.common.shapes import Body
-from .vehicles.model import Model
 
 #: prefixes of the parameters of waves and of the initial state
 WAVE_PREFIX, INITIAL_PREFIX = "wave.", "initial."

@@ -14,9 +14,9 @@ import numpy as np
 
 from cosim.core.errors import Problem
 
+from ..catalogue import Model
 from ..json_reader import argument_problem as warning
 from ..placement import VehiclePlacement
-from ..vehicles.model import Model
 
 if TYPE_CHECKING:
     from ..vehicles.multirotor.airframe import Airframe, Rotor

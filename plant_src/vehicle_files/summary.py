@@ -14,8 +14,7 @@ import numpy as np
 from cosim.core.component import Variable
 from cosim.core.errors import Problem
 
-from ..catalogue import model_from_data
-from ..vehicles.model import Model
+from ..catalogue import Model, model_from_data
 from ..vehicles.multirotor.airframe import Airframe
 from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel
 from ..vehicles.vessel.actuators import Propeller

@@ -13,9 +13,9 @@ import numpy as np
 from cosim.core.errors import Problem
 from cosim.core.units import KNOWN_UNITS
 
+from ..catalogue import Model
 from ..json_reader import argument_problem as warning
 from ..vehicles.common.vehicle_reader import RADIANS_EXPECTED
-from ..vehicles.model import Model
 from ..vehicles.planar_vessel.planar_vessel import PlanarVessel
 from ..vehicles.submerged.craft import Craft
 from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel

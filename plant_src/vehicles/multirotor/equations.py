@@ -63,8 +63,7 @@ from ..common.rigid_body import (
     with_world_outputs,
 )
 from ..common.water_surface import SURFACE_SUM
-from .airframe import MAX_ROTORS, Airframe, Rotor, RotorEffects
-from .interface import states, variables
+from .airframe import MAX_ROTORS, Airframe, Rotor, RotorEffects, states, variables
 from .loads import (
     RotorFunctions,
     add_water_loads,

@@ -65,8 +65,7 @@ from ..common.rigid_body import (
     symmetric_matrix,
     with_world_outputs,
 )
-from .craft import MAX_THRUSTERS, Craft, Thruster
-from .interface import OCTANTS, states, variables
+from .craft import MAX_THRUSTERS, OCTANTS, Craft, Thruster, states, variables
 
 _SMALLEST_EXTENT = 1e-3  # m, replaces the vertical extent of a box without size
 

@@ -14,10 +14,9 @@ from world_harness import WorldHarness, quadcopter_settings
 from cosim.core import resources
 from cosim.core.errors import InputError
 from cosim.core.units import parse_unit
-from plant_src.catalogue import MODELS
+from plant_src.catalogue import MODELS, Model
 from plant_src.physics import compiled_equations
 from plant_src.physics.compiled_equations import CompiledEquations
-from plant_src.vehicles.model import Model
 
 
 @pytest.fixture
