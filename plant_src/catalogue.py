@@ -7,6 +7,7 @@ their own.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -20,14 +21,16 @@ from cosim.core.component import Causality, Variable
 from cosim.core.errors import InputError, Problem, did_you_mean
 from cosim.export.equations.exported_interface import describe_variables
 
+from .json_reader import argument_problem as warning
 from .vehicles.common.interface import ENVIRONMENT_INPUTS
 from .vehicles.common.shapes import Body, Vector, inertia_of
 from .vehicles.common.vehicle_reader import VehicleData, read_visual
 from .vehicles.data import FOLDER
 
 if TYPE_CHECKING:
-    from .vehicles.multirotor.airframe import Airframe
-    from .vehicles.submerged.craft import Craft
+    from .vehicles.multirotor.airframe import Airframe, Rotor
+    from .vehicles.submerged.craft import Craft, Thruster
+    from .vehicles.vessel.actuators import Propeller
     from .vehicles.vessel.boat import Boat
 
 _Value = TypeVar("_Value")
@@ -38,6 +41,9 @@ NAMED_LISTS = ("rotors", "thrusters", "propellers")
 
 #: keys of a vehicle file of any family besides those of its family
 COMMON_KEYS = ("family", "name", "description", "sources", "validity", "visual", "$schema")
+
+#: largest extent of a vessel and of other vehicles (m); the longest ships have 460 m
+MAX_EXTENT = {True: 500.0, False: 100.0}
 
 #: vehicles that are given by a file, whose name is that of the vehicle
 _FILES = {file.stem: file for file in sorted(FOLDER.glob("*.json"))}
@@ -110,6 +116,65 @@ class Model:
                 with the name of a parameter.
         """
         return self.body_of(parameters) if self.body_of else self.body
+
+    @property
+    def box_corners(self) -> np.ndarray:
+        """Corners of all boxes (m, body frame), shape (n, 3).
+
+        Those of a vessel from O, else from the centre of mass.
+        """
+        corners: np.ndarray = np.concatenate([box.corners() for box in self.body.boxes])
+        axis, w = np.array(self.body.axes[:3]), self.body.axes[3]
+        corners = corners + 2 * np.cross(axis, w * corners + np.cross(axis, corners))
+        if self.boat and self.motion == "planar":
+            return corners + self.boat.centre_of_mass
+        return corners
+
+    def warnings(self) -> Iterator[Problem]:
+        """Yield what is probably wrong in the data of the vehicle, mostly units.
+
+        The vehicle can run nevertheless. The subject of a problem is "arguments" and the path in
+        the vehicle file.
+        """
+        if not (self.airframe or self.craft or self.boat):
+            return
+        corners, centre = self.box_corners, self.boat.centre_of_mass if self.boat else 0.0
+        reach = float(np.linalg.norm(corners - centre, axis=1).max())
+        yield from self._size_warnings(reach)
+        if self.airframe:
+            yield from self.airframe.warnings(reach)
+        elif vehicle := self.boat or self.craft:
+            from .vehicles.vessel_plausibility import vessel_warnings  # imports all vessels
+
+            yield from vessel_warnings(vehicle, corners, self.visual, MAX_EXTENT[True])
+
+    def _size_warnings(self, reach: float) -> Iterator[Problem]:
+        if reach > (limit := MAX_EXTENT[self.is_vessel]) / 2:
+            yield warning(
+                (
+                    f"a corner is {reach:.4g} m from the centre of mass, expected less than "
+                    f"{limit / 2:g} m"
+                ),
+                "boxes",
+            )
+        farthest = max(reach, *(float(np.linalg.norm(part.position)) for part in self._actuators))
+        radius = math.sqrt(max(self.body.inertia) / self.body.mass)
+        if radius > farthest:
+            key = "yaw_inertia" if self.motion == "planar" else "inertia"
+            text = (
+                f"the radius of gyration, the square root of inertia over mass, is {radius:.3g} m, "
+                "but the farthest point of "
+                f"the vehicle is {farthest:.3g} m from the centre of mass"
+            )
+            yield warning(text, key)
+
+    @property
+    def _actuators(self) -> Sequence[Rotor | Thruster | Propeller]:
+        if self.airframe:
+            return self.airframe.rotors
+        if self.craft:
+            return self.craft.thrusters
+        return self.boat.propellers if self.boat else ()
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:

@@ -19,6 +19,7 @@ from cosim.core.component import Variable
 from cosim.core.errors import Problem
 
 from ...json_reader import JsonPath
+from ...json_reader import argument_problem as warning
 from ..common.interface import (
     CURRENT_INPUTS,
     EXTERNAL_LOADS,
@@ -49,6 +50,21 @@ from ..common.vehicle_reader import (
 
 #: largest number of rotors
 MAX_ROTORS = 16
+
+#: largest distance of a rotor from the centre of mass over the median of all rotors, and over the
+#: farthest corner of the boxes
+MAX_ROTOR_DISTANCE = 5.0
+#: smallest and largest ratio of thrust to weight; the shipped multirotors have 1.7 to 3.2, racing
+#: drones reach about 15
+MIN_THRUST_RATIO, MAX_THRUST_RATIO = 1.3, 30.0
+#: largest speed of the tips of rotors (m/s), the speed of sound
+MAX_TIP_SPEED = 340.0
+#: largest thrust coefficient, thrust over air density, disc area and squared tip speed; the shipped
+#: rotors have about 0.01
+MAX_THRUST_COEFFICIENT = 0.1
+_AIR_DENSITY = 1.225
+#: z component of the axis of a rotor that pushes downwards
+_DOWNWARDS = -0.1
 
 
 @dataclass(frozen=True)
@@ -177,6 +193,82 @@ class Airframe(FreeVehicle):
             if not all(map(math.isfinite, rotor.position)):
                 text = f"found {rotor.position}, expected finite numbers"
                 yield self.problem(text, name, "position")
+
+    def warnings(self, reach: float) -> Iterator[Problem]:
+        """Yield what is probably wrong; the subject is "arguments" and the path in the file.
+
+        Args:
+            reach: Distance (m) of the farthest corner of the boxes from the centre of mass.
+        """
+        yield from self._thrust_warnings()
+        yield from self._rotor_warnings(reach)
+
+    def _thrust_warnings(self) -> Iterator[Problem]:
+        ratio = self.lift / (self.mass * self.gravity)
+        if ratio > MAX_THRUST_RATIO:
+            text, *path = self._cause_of_thrust()
+            yield warning(
+                f"thrust over weight is {ratio:.3g}, expected less than {MAX_THRUST_RATIO:g}{text}",
+                *path,
+            )
+        elif ratio < MIN_THRUST_RATIO:
+            text = (
+                f"thrust over weight is {ratio:.3g}, expected more than {MIN_THRUST_RATIO:g}: it "
+                "can hardly climb"
+            )
+            yield warning(text, "mass")
+
+    def _cause_of_thrust(self) -> tuple[str, ...]:
+        """Return the probable cause of a thrust that is too large, and the path of its key."""
+        tip_speed = self.max_rotor_speed * self.rotor_radius
+        if tip_speed > MAX_TIP_SPEED:
+            found = (
+                f"{self.max_rotor_speed:.4g} rad/s make {tip_speed:.4g} m/s at the tips of the "
+                "rotors"
+            )
+            return f"; {found}: is max_speed in rpm?", "rotor", "max_speed"
+        area, thrust = (
+            math.pi * self.rotor_radius**2,
+            max(rotor.thrust_coefficient for rotor in self.rotors),
+        )
+        coefficient = thrust / (_AIR_DENSITY * area * self.rotor_radius**2)
+        if coefficient > MAX_THRUST_COEFFICIENT:
+            text = (
+                f"; the thrust is {coefficient:.3g} times air density, disc area and squared tip "
+                "speed, about 0.01 is usual"
+            )
+            return text, "rotor", "thrust_coefficient"
+        return "", "mass"
+
+    def _rotor_warnings(self, reach: float) -> Iterator[Problem]:
+        distances = [float(np.linalg.norm(rotor.position)) for rotor in self.rotors]
+        ordered, middle = sorted(distances), len(distances) // 2
+        # not np.median, whose first call imports masked arrays for 0.04 s
+        median = (ordered[middle] + ordered[-1 - middle]) / 2
+        limit = MAX_ROTOR_DISTANCE * max(self.rotor_radius, min(median, 2 * reach))
+        for i, (rotor, distance) in enumerate(zip(self.rotors, distances, strict=True)):
+            if distance > limit:
+                text = f"{distance:.4g} m from the centre of mass, expected less than {limit:.3g} m"
+                yield warning(text, "rotors", str(i), "position")
+            if rotor.axis[2] < _DOWNWARDS:
+                axis = ", ".join(f"{round(each, 3):g}" for each in rotor.axis)
+                yield warning(
+                    f"the rotor pushes downwards, its thrust points along [{axis}]",
+                    "rotors",
+                    str(i),
+                    "axis",
+                )
+        torques = [
+            rotor.thrust_coefficient * np.cross(rotor.position, rotor.axis)[2]
+            + rotor.torque_sign * rotor.torque_coefficient * rotor.axis[2]
+            for rotor in self.rotors
+        ]
+        if min(torques) > 0 or max(torques) < 0:
+            text = (
+                "all turn the vehicle about z in the same direction, it cannot hold its yaw angle: "
+                "change turns of some"
+            )
+            yield warning(text, "rotors")
 
 
 #: required keys of the file

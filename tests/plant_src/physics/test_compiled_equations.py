@@ -159,7 +159,7 @@ def test_other_start_values_and_descriptions_are_the_same_equations() -> None:
 
 
 def test_another_division_into_arrays_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("plant_src.vehicles.model.ENVIRONMENT_INPUTS", {"wind.x", "wave_gain"})
+    monkeypatch.setattr("plant_src.catalogue.ENVIRONMENT_INPUTS", {"wind.x", "wave_gain"})
     with pytest.raises(
         InputError,
         match=r'array "inputs" of other size: found 8 elements, expected 12; rebuild it with `',
