@@ -93,7 +93,7 @@ class SpinningRotors(NamedTuple):
 
 @dataclass(frozen=True)
 class MultirotorEquations:
-    """Equations of an airframe; the vectors hold the variables of `interface.variables` in order.
+    """Equations of an airframe; the vectors hold the variables of `airframe.variables` in order.
 
     `inputs` and `constants` are vectors in the public methods and named values in the private ones.
 

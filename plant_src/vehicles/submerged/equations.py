@@ -131,7 +131,7 @@ def solve_symmetric(matrix: ca.SX, right: ca.SX) -> ca.SX:
 class SubmergedEquations:
     """Equations of a submerged vehicle.
 
-    The vectors hold the variables of `interface.variables` in order.
+    The vectors hold the variables of `craft.variables` in order.
 
     Attributes:
         craft: Craft with the start values.
