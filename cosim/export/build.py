@@ -1,7 +1,5 @@
 """Export of all sources to `fmus/` (`cosim build`), and its manifest."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass

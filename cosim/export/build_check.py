@@ -1,7 +1,5 @@
 """Check that the FMUs in `fmus/` correspond to their sources and behave like a rebuild."""
 
-from __future__ import annotations
-
 import multiprocessing
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor

@@ -7,8 +7,6 @@ function only. The code is readable, compiles without warnings and depends only 
 mathematical library.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence

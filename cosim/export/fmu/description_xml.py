@@ -1,7 +1,5 @@
 """modelDescription.xml and buildDescription.xml of an FMU: contents and validation."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path

@@ -5,8 +5,6 @@ as many equations `time = time`, or variables, as are missing. The matching of t
 which variables no equation determines, or which equations contradict others.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager

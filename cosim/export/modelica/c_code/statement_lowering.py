@@ -1,7 +1,5 @@
 """Lowering of Modelica statements to C."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, replace
 from itertools import chain

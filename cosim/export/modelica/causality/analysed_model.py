@@ -1,7 +1,5 @@
 """Result of the analysis of a model: schedule, roles of parameters, default values."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter

@@ -4,8 +4,6 @@ A when-clause becomes an if-statement on the event flags due(k), "clock k ticks 
 risen(k), "the condition of edge detector k has become true in this event".
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any

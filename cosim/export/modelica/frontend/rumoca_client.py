@@ -1,7 +1,5 @@
 """Client of the child process in which rumoca runs, and the parts of a model that it may change."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
