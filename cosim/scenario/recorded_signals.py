@@ -1,7 +1,5 @@
 """Recorded signals, which patterns select, and the stop conditions on them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
