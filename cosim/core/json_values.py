@@ -37,16 +37,6 @@ def parse_object(text: str | bytes) -> dict[str, Any]:
     return value
 
 
-def copy_json(value: Any) -> Any:
-    """Return a deep copy of a value of objects and lists.
-
-    Five times faster than `copy.deepcopy`.
-    """
-    if isinstance(value, dict):
-        return {key: copy_json(each) for key, each in value.items()}
-    return [copy_json(each) for each in value] if isinstance(value, list) else value
-
-
 def is_number(value: Any) -> bool:
     """Return whether a value is a Boolean, a float, or an integer in the range of a double."""
     return isinstance(value, float) or (isinstance(value, int) and abs(value) <= sys.float_info.max)
