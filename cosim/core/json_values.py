@@ -4,8 +4,6 @@ Values that JSON does not have are written as others: bytes become {"bytes": hex
 NumPy values become lists and numbers.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from typing import Any

@@ -1,7 +1,5 @@
 """Session and resource limits of a child process."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import resource

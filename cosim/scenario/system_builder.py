@@ -1,7 +1,5 @@
 """Construction of a system and its settings from a scenario, collecting all problems."""
 
-from __future__ import annotations
-
 import logging
 import re
 from collections import defaultdict
