@@ -247,9 +247,14 @@ def _write_report(outcome: RunOutcome) -> None:
 
 def _write_figures(outcome: RunOutcome) -> Iterator[tuple[str, str]]:
     """Write the figures, and yield name and SVG text of each."""
+    from matplotlib import artist
+
     from ..process.journal import calling_component
     from ..report.figures import draw_figure, figure_to_svg, save_figure
 
+    # matplotlib lists all properties in the documentation of each class when it is imported; a
+    # command does not show it, and it takes a twentieth of the processor time of a short run
+    cast(Any, artist).kwdoc = str
     for name, function, arguments in outcome.prepared.figures():
         with calling_component(f'figure "{name}"', function.__name__):
             figure = draw_figure(outcome.result, name, function, arguments)

@@ -3,8 +3,6 @@
 The shipped files are scenarios, FMUs, and sources of plant and controllers.
 """
 
-from __future__ import annotations
-
 import os
 import stat
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Session, resource limits and end of a child process."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import resource

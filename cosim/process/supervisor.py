@@ -5,8 +5,6 @@ attributed to the component and function that were called, at no cost per step. 
 are in a file, which survives the child.
 """
 
-from __future__ import annotations
-
 import ctypes
 import mmap
 import os

@@ -3,8 +3,6 @@
 First column `time`, quoted names, no row of units, Booleans as 0 and 1, exact numbers.
 """
 
-from __future__ import annotations
-
 import csv
 import re
 from collections import Counter

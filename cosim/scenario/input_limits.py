@@ -106,7 +106,7 @@ def _set_values(prepared: PreparedRun) -> Iterator[tuple[str, Variable, Any, str
     places = _assigned_places(prepared)
     changes = [
         (prepared.system.start_values, ""),
-        *((event.values, event.where) for event in prepared.settings.events),
+        *((event.values, event.where) for event in prepared.plan.settings.events),
     ]
     for values_by_component, where in changes:
         for name, values in values_by_component.items():
@@ -204,7 +204,7 @@ def _find_excesses(
         return
     recorded = {
         end: recording.columns[name]
-        for name, end in prepared.settings.columns.items()
+        for name, end in prepared.plan.settings.columns.items()
         if name in recording.columns
     }
     feeding: dict[Endpoint, list[Connection]] = {}

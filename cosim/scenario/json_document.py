@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from ..core.errors import InputError, Problem, abbreviate_names, nearest_file, nearest_name
-from ..core.json_values import copy_json
 from ..core.paths import open_text
 from ..core.text import acceptable_text, count_noun, shorten, text_problem
 
@@ -210,6 +209,16 @@ def read_document(file: Path) -> Document:
         settings={},
         set_documents={},
     )
+
+
+def copy_json(value: Any) -> Any:
+    """Return a deep copy of a value of objects and lists.
+
+    Five times faster than `copy.deepcopy`.
+    """
+    if isinstance(value, dict):
+        return {key: copy_json(each) for key, each in value.items()}
+    return [copy_json(each) for each in value] if isinstance(value, list) else value
 
 
 @lru_cache(8)  # studies read the same files for each run

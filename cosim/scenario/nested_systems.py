@@ -14,7 +14,6 @@ from typing import Any
 from ..components.python_import import package_files
 from ..core import paths, resources
 from ..core.errors import InputError, Problem
-from ..core.json_values import copy_json
 from ..core.size_limits import (
     MAX_COMPONENTS,
     MAX_CONNECTIONS,
@@ -28,7 +27,7 @@ from .component_schema import change_paths
 from .evaluation_schema import CallSpec
 from .extension import expand_document, read_system_document
 from .file_paths import find_scenario, relocating
-from .json_document import Document, pointer_keys, set_value
+from .json_document import Document, copy_json, pointer_keys, set_value
 from .schema import NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
 from .schema_types import accepted
 from .settings import apply_settings, document_of_dict

@@ -17,11 +17,10 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from ..core.errors import Problem, did_you_mean, nearest_name
-from ..core.json_values import copy_json
 from ..core.text import REPLACEMENT, count_noun
 from .component_schema import component_model
 from .component_sources import ComponentSource
-from .json_document import Document
+from .json_document import Document, copy_json
 from .schema import SystemSpec
 from .schema_types import INVALID, PlacedError, hint_at_quotes
 

@@ -1,7 +1,5 @@
 """Check of values against the variables to which a scenario or a Python caller assigns them."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Sequence

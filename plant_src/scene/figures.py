@@ -1,7 +1,5 @@
 """Rendered figures of a mission."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

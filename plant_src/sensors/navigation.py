@@ -8,8 +8,6 @@ M.-D. Hua, "Attitude estimation for accelerated vehicles using GPS/INS measureme
 Engineering Practice 18 (2010).
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Sequence

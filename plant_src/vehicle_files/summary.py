@@ -4,8 +4,6 @@ Mass, inertia, dimensions, actuators, top speed and turning of a vessel, paramet
 mistakes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 

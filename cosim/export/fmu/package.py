@@ -3,8 +3,6 @@
 Sources, model description, binary and resources in one archive.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from hashlib import sha256
 from importlib.util import find_spec

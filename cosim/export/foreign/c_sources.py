@@ -3,8 +3,6 @@
 A folder with C files and a modelDescription.xml.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from xml.etree import ElementTree
 

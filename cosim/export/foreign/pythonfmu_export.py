@@ -9,8 +9,6 @@ the modules that it imports become members of a package. The name of the package
 all contents, so that FMUs with modules of the same name do not conflict.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Lowering of Modelica statements to C."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -136,7 +134,8 @@ class StatementLowering(ExpressionLowering):
         `else { if ... }` is shortened to `else if` where possible.
         """
         self.lines += yes
-        if no and _is_one_if(no):
+        is_one_if = no and no[0].startswith("    if (") and no[0].endswith("{")
+        if is_one_if and no.index("    }") == len(no) - 1:
             self.lines += ["} else " + no[0].strip(), *(line[4:] for line in no[1:])]
         elif no:
             self.lines += ["} else {", *no, "}"]
@@ -302,12 +301,3 @@ class StatementLowering(ExpressionLowering):
 def _variables_read(node: Expression) -> set[str]:
     """Return the variables whose current value an expression reads."""
     return {referenced_variable(reference) for reference in read_references(node)}
-
-
-def _is_one_if(lines: list[str]) -> bool:
-    """Return whether the lines are one if-statement."""
-    return (
-        lines[0].startswith("    if (")
-        and lines[0].endswith("{")
-        and lines.index("    }") == len(lines) - 1
-    )

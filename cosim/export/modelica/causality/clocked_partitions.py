@@ -5,8 +5,6 @@ partitions and from the previous tick do. Therefore only these become variables 
 sets at a tick; the clocked equations remain equations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
 from typing import Any

@@ -7,8 +7,6 @@ requires versions. The annotation `conversion(noneFromVersion=...)` of a library
 versions that it replaces without changes (section 18.8).
 """
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence

@@ -7,8 +7,6 @@ equations of the first iterations and a template for all iterations. The equatio
 iterations are placeholders such as `der(x[3]) = 0.0`, in which only the left side is correct.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import chain, product

@@ -1,7 +1,5 @@
 """Conversion of the front end's messages to problems with file and line."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
