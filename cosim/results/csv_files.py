@@ -226,7 +226,7 @@ def parse_rows(path: Path, text: str) -> tuple[list[str], list[list[str]]]:
         InputError: The text is empty, or has a cell above `MAX_TEXT_LENGTH`.
     """
     csv.field_size_limit(max(csv.field_size_limit(), MAX_TEXT_LENGTH))
-    reader = csv.reader(StringIO(text, newline=""))
+    reader = csv.reader(StringIO(text, newline=""), skipinitialspace=True)
     try:
         rows = list(reader)
     except csv.Error as error:
@@ -257,6 +257,6 @@ def parse_number_rows(text: str) -> tuple[list[str], list[list[float]]] | None:
         rows = pydantic_core.from_json(
             b"[[" + data.removesuffix(b"\n").replace(b"\n", b"],[") + b"]]"
         )
-        return next(csv.reader([header])), rows
+        return next(csv.reader([header], skipinitialspace=True)), rows
     except (ValueError, csv.Error, StopIteration):
         return None
