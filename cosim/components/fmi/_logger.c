@@ -150,12 +150,23 @@ static void format_message(Buffer *b, const char *message, va_list *arguments) {
     }
 }
 
+/* Call the receiver, which is Python code, without an exception that the FMU has not handled yet:
+   its own calls would fail. PythonFMU sends messages before it handles the exception of a slave. */
+static void receive(void *environment, const char *name, int status, const char *text) {
+    PyObject *type, *value, *traceback;
+    PyGILState_STATE state = PyGILState_Ensure();
+    PyErr_Fetch(&type, &value, &traceback);
+    receiver(environment, name, status, text);
+    PyErr_Restore(type, value, traceback);
+    PyGILState_Release(state);
+}
+
 static void log_message(void *environment, const char *name, int status, const char *category,
                         const char *message, ...) {
     (void)category;
     if (!receiver) return;
     if (!message || !strchr(message, '%')) {
-        receiver(environment, name, status, message);
+        receive(environment, name, status, message);
         return;
     }
     Buffer buffer = {.length = 0};
@@ -164,7 +175,7 @@ static void log_message(void *environment, const char *name, int status, const c
     format_message(&buffer, message, &arguments);
     va_end(arguments);
     buffer.text[buffer.length] = 0;
-    receiver(environment, name, status, buffer.text);
+    receive(environment, name, status, buffer.text);
 }
 
 static struct PyModuleDef definition = {

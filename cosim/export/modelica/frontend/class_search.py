@@ -4,8 +4,6 @@ The models that a file declares are listed if a model is not found. An operator 
 refuses without a place is searched in the classes that a model uses, directly or indirectly.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """Client of the child process in which rumoca runs, and the parts of a model that it may change."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -70,7 +68,10 @@ def run_rumoca(
     }
     with TemporaryFile() as output, TemporaryFile() as errors:
         reason = _run_process(json.dumps(request).encode(), output, errors)
-        messages = _read_messages(output)
+        output.seek(0)
+        messages: list[dict[str, Any]] = [
+            json.loads(line) for line in output if line.endswith(b"\n")
+        ]
         errors.seek(0)
         if _OUT_OF_MEMORY in errors.read(OUTPUT_LIMIT):
             reason = f"it needs more than {MEMORY_LIMIT >> 30} GiB of memory"
@@ -105,12 +106,6 @@ def _run_process(request: bytes, output: Any, errors: Any) -> str:
     return describe_exit_status(
         -process.returncode if process.returncode < 0 else process.returncode << 8
     )
-
-
-def _read_messages(output: Any) -> list[dict[str, Any]]:
-    """Return the complete messages."""
-    output.seek(0)
-    return [json.loads(line) for line in output if line.endswith(b"\n")]
 
 
 _PART_TOKEN = re.compile(
