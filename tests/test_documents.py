@@ -158,3 +158,10 @@ def test_every_command_is_listed():
 
     text = (ROOT / "docs/commands.md").read_text()
     assert re.findall(r"^\| `cosim ([\w-]+)", text, re.MULTILINE) == list(COMMANDS)
+
+
+@pytest.mark.slow
+def test_the_routes_of_values_are_up_to_date():
+    command = [sys.executable, ROOT / "tests/support/value_routes.py", "--check"]
+    done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    assert done.returncode == 0, done.stderr

@@ -98,7 +98,13 @@ def write_outputs(outcome: RunOutcome) -> int:
     if failure := result.failure:
         code = _end_failed_run(outcome, failure)
     else:
-        _write_result_files(outcome)
+        from ..process.run_files import remove_run_files, run_folder
+        from ..results.result import write_run
+
+        with writing_results(outcome.result, run_folder(), outcome.shown_folder):
+            write_run(outcome.result, outcome.folder)
+        remove_run_files()
+        outcome.files.extend(("result.csv", "kpis.json", "run.json"))
         if not options.as_json:
             _print_kpis(outcome)
         if not options.no_report:
@@ -210,17 +216,6 @@ def save_after_crash(outcome: SupervisedOutcome, options: RunOptions) -> None:
             supervision.run_supervised_command(
                 lambda: _report_failed_run(partial, folder.parent, options, code)
             )
-
-
-def _write_result_files(outcome: RunOutcome) -> None:
-    """Write result.csv, kpis.json and run.json in place of the files of the unfinished run."""
-    from ..process.run_files import remove_run_files, run_folder
-    from ..results.result import write_run
-
-    with writing_results(outcome.result, run_folder(), outcome.shown_folder):
-        write_run(outcome.result, outcome.folder)
-    remove_run_files()
-    outcome.files.extend(("result.csv", "kpis.json", "run.json"))
 
 
 def _print_kpis(outcome: RunOutcome) -> None:

@@ -71,7 +71,11 @@ class Document:
         if setting := next(
             (path[:n] for n in range(len(path), 0, -1) if path[:n] in self.settings), None
         ):
-            return self._where_set(path, setting)
+            text = f'setting "{self.settings[setting]}"'
+            for n in range(len(path), len(setting) - 1, -1):
+                if document := self.set_documents.get(path[:n]):
+                    return f"{text}: {document.where(path[n:])}"
+            return text if path == setting else f"{text}: {json_path(path)}"
         while known and known not in self.origins and known not in self.offsets:
             known = known[:-1]
         if (origin := self.origins.get(known)) and origin.document is not self:
@@ -79,14 +83,6 @@ class Document:
         if self.is_dict:
             return f"scenario: {json_path(path)}"
         return f"{self.position(self.offsets.get(known, 0))}: {json_path(path)}"
-
-    def _where_set(self, path: JsonPath, setting: JsonPath) -> str:
-        """Return the JSON pointer of a setting, and the position in the file that it names."""
-        text = f'setting "{self.settings[setting]}"'
-        for n in range(len(path), len(setting) - 1, -1):
-            if document := self.set_documents.get(path[:n]):
-                return f"{text}: {document.where(path[n:])}"
-        return text if path == setting else f"{text}: {json_path(path)}"
 
     def _with_indices(self, path: Sequence[str | int]) -> JsonPath:
         """Return a path whose keys are numbers where the value is a list."""

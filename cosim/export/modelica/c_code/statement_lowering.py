@@ -83,18 +83,17 @@ class StatementLowering(ExpressionLowering):
         ):
             self.lower_call(value, target.pointer)
         else:
-            self._store_value(target, value, reference)
-
-    def _store_value(self, target: CValue, value: Expression, reference: Expression) -> None:
-        lowered = self.lower(value)
-        if lowered.shape not in ((), target.shape):
-            sizes = f"found size {list(lowered.shape)}, expected {list(target.shape)}"
-            raise_model_error(f"assignment of an array: {sizes}", getattr(reference, "where", None))
-        if lowered.shape != target.shape:
-            lowered = replace(self.evaluated_once(lowered), shape=target.shape)
-        if target.shape and _variables_read(value) & variable_names(reference):
-            lowered = self.evaluated_once(replace(lowered, reusable=False))
-        self.copy_elements(target, lowered)
+            lowered = self.lower(value)
+            if lowered.shape not in ((), target.shape):
+                sizes = f"found size {list(lowered.shape)}, expected {list(target.shape)}"
+                raise_model_error(
+                    f"assignment of an array: {sizes}", getattr(reference, "where", None)
+                )
+            if lowered.shape != target.shape:
+                lowered = replace(self.evaluated_once(lowered), shape=target.shape)
+            if target.shape and _variables_read(value) & variable_names(reference):
+                lowered = self.evaluated_once(replace(lowered, reusable=False))
+            self.copy_elements(target, lowered)
 
     def _can_return_into(self, value: Call, target: CValue) -> bool:
         """Return whether a function can write its result to the target without a copy."""
