@@ -5,8 +5,6 @@ Horizontal paths, tracking error over time and landing over time (figures 14 to 
 Every function takes a result and names of signals or signal prefixes, like the KPIs in `kpis.py`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any, cast

@@ -8,8 +8,6 @@ rows; horizontal distances lie in the x-y plane of the world. A value that a run
 NaN or False.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

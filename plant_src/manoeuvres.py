@@ -16,8 +16,6 @@ The criteria of the resolution are made for ships of at least 100 m:
 - 20/20 zig-zag: first overshoot at most 25 deg
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -12,10 +12,10 @@ import numpy as np
 
 from cosim.core.errors import InputError
 
+from .catalogue import Model
 from .json_reader import JsonPath, JsonReader, Numbers
 from .vehicles.common.shapes import Body, Vector
 from .vehicles.common.vehicle_reader import read_triangles
-from .vehicles.model import Model
 
 
 class ContactSurface(NamedTuple):

@@ -29,9 +29,8 @@ from .physics.contacts import FLAG_COUNT, overlap_depths
 from .physics.fleet import Fleet, FleetState
 from .placement import VehiclePlacement
 from .variable_views import recorded_others, variable_views, views_in_parts
-from .vehicle_files.plausibility import placement_warnings
 from .vehicles.otter.parameters import MAX_PROPELLER_SPEED, MIN_PROPELLER_SPEED
-from .world_settings import INITIAL_PREFIX, WAVE_PREFIX, WorldSettings
+from .world_settings import INITIAL_PREFIX, WAVE_PREFIX, WorldSettings, placement_warnings
 
 if TYPE_CHECKING:
     from cosim.results import Result

@@ -5,16 +5,17 @@ All problems are reported together.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from cosim.core.component import Variable
-from cosim.core.errors import InputError, did_you_mean
+from cosim.core.errors import InputError, Problem, did_you_mean
 
-from .catalogue import models_of
+from .catalogue import Model, models_of
 from .environment import settings
 from .environment.sea import Sea
 from .environment.settings import EnvironmentSettings
@@ -28,7 +29,6 @@ from .placement import (
     read_surface,
 )
 from .vehicles.common.shapes import Body
-from .vehicles.model import Model
 
 #: prefixes of the parameters of waves and of the initial state
 WAVE_PREFIX, INITIAL_PREFIX = "wave.", "initial."
@@ -251,3 +251,18 @@ def _with_waves(sea: Sea, vehicle: VehiclePlacement) -> VehiclePlacement:
         for k, value in enumerate(getattr(sea, name).tolist(), start=1):
             waves[f"{WAVE_PREFIX}{name}[{k}]"] = value
     return replace(vehicle, parameters={**vehicle.parameters, **waves})
+
+
+def placement_warnings(vehicle: VehiclePlacement) -> Iterator[Problem]:
+    """Yield a warning for each value of a vehicle in a world that is probably wrong.
+
+    The subject is its path in the component.
+    """
+    path = ("arguments", "vehicles", vehicle.name)
+    for each in vehicle.model.warnings():
+        yield replace(each, subject=(*path, "model", *each.subject[1:]))
+    if abs(yaw := vehicle.parameters["initial.yaw"]) > 2 * math.pi:
+        yield Problem(
+            f"found {yaw:g}, radians expected; in degrees? A right angle is 1.5708",
+            subject=(*path, "yaw"),
+        )

@@ -133,14 +133,32 @@ def is_reachable(document, target):
     return target.startswith("https://") or (document.parent / target).exists()
 
 
-def test_links_lead_somewhere():
-    guides = [
-        path for path in sorted((ROOT / "docs").rglob("*.md")) if path.parent != ROOT / "docs"
-    ]
-    for document in (*DOCUMENTS, *guides):
-        text = re.sub(r"```.*?```", "", document.read_text(), flags=re.DOTALL)
-        for target in re.findall(r"\]\(([^)#]+)\)", text):
-            assert is_reachable(document, target), f"{document.name}: {target}"
+FOLDERS_WITH_DOCUMENTS = (
+    "cosim",
+    "plant_src",
+    "controllers",
+    "scenarios",
+    "docs",
+    "tests",
+    ".github",
+)
+
+
+def all_documents():
+    """Return every Markdown file of the repository."""
+    found = set(ROOT.glob("*.md"))
+    for folder in FOLDERS_WITH_DOCUMENTS:
+        found.update((ROOT / folder).rglob("*.md"))
+    return sorted(path for path in found if "node_modules" not in path.parts)
+
+
+@pytest.mark.parametrize(
+    "document", [pytest.param(path, id=str(path.relative_to(ROOT))) for path in all_documents()]
+)
+def test_links_lead_somewhere(document):
+    text = re.sub(r"```.*?```", "", document.read_text(), flags=re.DOTALL)
+    targets = re.findall(r"\]\(([^)#]+)", text)
+    assert [target for target in targets if not is_reachable(document, target)] == []
 
 
 def test_every_scenario_is_listed():
@@ -158,3 +176,10 @@ def test_every_command_is_listed():
 
     text = (ROOT / "docs/commands.md").read_text()
     assert re.findall(r"^\| `cosim ([\w-]+)", text, re.MULTILINE) == list(COMMANDS)
+
+
+@pytest.mark.slow
+def test_the_routes_of_values_are_up_to_date():
+    command = [sys.executable, ROOT / "tests/support/value_routes.py", "--check"]
+    done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    assert done.returncode == 0, done.stderr

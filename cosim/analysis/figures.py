@@ -4,8 +4,6 @@
  "arguments": {"components": "uav", "at": 15}}
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import pi
 from typing import Any

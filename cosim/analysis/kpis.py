@@ -7,8 +7,6 @@ Each function runs the scenario of the result again up to a point in time, where
 loop.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

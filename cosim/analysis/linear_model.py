@@ -1,7 +1,5 @@
 """Linear state-space model with named inputs, outputs and states."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

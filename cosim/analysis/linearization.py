@@ -5,8 +5,6 @@ models, impulse responses from a saved state are measured and realized, so compo
 to their states. The model then holds the states that the inputs reach and the outputs show.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence, Set
 from itertools import chain
 from typing import Any

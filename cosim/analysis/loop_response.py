@@ -5,8 +5,6 @@ transfer function of the loop that is broken at this signal while all others rem
 sign of negative feedback.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """Trim: inputs, parameters and initial states with which a scenario starts in equilibrium."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

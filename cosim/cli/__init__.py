@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import atexit
 import gc
+import os
 import sys
 import traceback
 from collections.abc import Callable
@@ -146,6 +147,10 @@ def main(arguments: list[str] | None = None) -> None:
         # almost all objects of a command exist until its process ends
         gc.set_threshold(_GC_THRESHOLD)
         atexit.register(gc.freeze)
+        # NumPy's BLAS starts threads when it is loaded. They wait busily, which takes a fifth of
+        # the processor time of a short run, and large matrices get other bits with each number
+        # of processors
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         arguments = sys.argv[1:]
     open_closed_streams()
     sys.stdout, sys.stderr = protected_stream(sys.stdout), protected_stream(sys.stderr)

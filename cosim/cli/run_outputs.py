@@ -98,7 +98,13 @@ def write_outputs(outcome: RunOutcome) -> int:
     if failure := result.failure:
         code = _end_failed_run(outcome, failure)
     else:
-        _write_result_files(outcome)
+        from ..process.run_files import remove_run_files, run_folder
+        from ..results.result import write_run
+
+        with writing_results(outcome.result, run_folder(), outcome.shown_folder):
+            write_run(outcome.result, outcome.folder)
+        remove_run_files()
+        outcome.files.extend(("result.csv", "kpis.json", "run.json"))
         if not options.as_json:
             _print_kpis(outcome)
         if not options.no_report:
@@ -212,17 +218,6 @@ def save_after_crash(outcome: SupervisedOutcome, options: RunOptions) -> None:
             )
 
 
-def _write_result_files(outcome: RunOutcome) -> None:
-    """Write result.csv, kpis.json and run.json in place of the files of the unfinished run."""
-    from ..process.run_files import remove_run_files, run_folder
-    from ..results.result import write_run
-
-    with writing_results(outcome.result, run_folder(), outcome.shown_folder):
-        write_run(outcome.result, outcome.folder)
-    remove_run_files()
-    outcome.files.extend(("result.csv", "kpis.json", "run.json"))
-
-
 def _print_kpis(outcome: RunOutcome) -> None:
     """Print the table of KPIs; with --quiet, print only the failed checks."""
     if current_command_line().verbosity < 0:
@@ -247,9 +242,14 @@ def _write_report(outcome: RunOutcome) -> None:
 
 def _write_figures(outcome: RunOutcome) -> Iterator[tuple[str, str]]:
     """Write the figures, and yield name and SVG text of each."""
+    from matplotlib import artist
+
     from ..process.journal import calling_component
     from ..report.figures import draw_figure, figure_to_svg, save_figure
 
+    # matplotlib lists all properties in the documentation of each class when it is imported; a
+    # command does not show it, and it takes a twentieth of the processor time of a short run
+    cast(Any, artist).kwdoc = str
     for name, function, arguments in outcome.prepared.figures():
         with calling_component(f'figure "{name}"', function.__name__):
             figure = draw_figure(outcome.result, name, function, arguments)

@@ -185,7 +185,8 @@ def find_violations(candidate: Any) -> Iterator[str]:
         candidate.variables if isinstance(candidate.variables, Sequence) else [candidate.variables]
     )
     variables = [entry for entry in entries if isinstance(entry, Variable)]
-    yield from _check_entries(entries)
+    for entry in entries:
+        yield from _find_entry_violations(entry)
     for name, count in Counter(str(variable.name) for variable in variables).items():
         if count > 1:
             yield f'variable "{name}" is declared {count} times'
@@ -202,28 +203,22 @@ def find_violations(candidate: Any) -> Iterator[str]:
             yield f'"{name}" does not take the arguments ({", ".join(arguments)})'
 
 
-def _check_entries(entries: Sequence[Any]) -> Iterator[str]:
-    for entry in entries:
-        if isinstance(entry, Variable):
-            for text in _check_variable_fields(entry):
-                yield f'variable "{entry.name}": {text}'
-        else:
-            yield f'"variables" contains {entry!r}, expected a cosim.core.component.Variable'
-
-
-def _check_variable_fields(variable: Variable) -> Iterator[str]:
+def _find_entry_violations(entry: Any) -> Iterator[str]:
+    """Yield what is wrong with an element of `Component.variables`."""
+    if not isinstance(entry, Variable):
+        yield f'"variables" contains {entry!r}, expected a cosim.core.component.Variable'
+        return
+    start = f'variable "{entry.name}": '
     for field, valid in _VALID_FIELD_VALUES.items():
-        if (value := getattr(variable, field)) not in valid:
-            yield f'{field} is "{value}"{did_you_mean(str(value), valid)}'
-    if not isinstance(variable.unit, Unit | None):
+        if (value := getattr(entry, field)) not in valid:
+            yield f'{start}{field} is "{value}"{did_you_mean(str(value), valid)}'
+    if not isinstance(entry.unit, Unit | None):
         yield (
-            f"unit is {variable.unit!r}, expected a cosim.core.units.Unit, such as "
-            f"parse_unit({str(variable.unit)!r})"
+            f"{start}unit is {entry.unit!r}, expected a cosim.core.units.Unit, such as "
+            f"parse_unit({str(entry.unit)!r})"
         )
-    if not isinstance(variable.shape, tuple) or not all(
-        isinstance(size, int) for size in variable.shape
-    ):
-        yield f"shape is {variable.shape!r}, expected a tuple of sizes"
+    if not isinstance(entry.shape, tuple) or not all(isinstance(size, int) for size in entry.shape):
+        yield f"{start}shape is {entry.shape!r}, expected a tuple of sizes"
 
 
 def _required_methods(causalities: set[Causality], has_state: bool) -> Iterator[str]:

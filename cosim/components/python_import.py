@@ -158,25 +158,37 @@ def _unique_name(root: Path, parts: Sequence[str]) -> str:
 
 
 class _FolderFinder(MetaPathFinder):
-    """Finder of files in folders that are no packages, for `_import_file`."""
+    """Finder of files for `_import_file`."""
 
     def find_spec(
         self, name: str, path: Sequence[str] | None, _target: object = None
     ) -> ModuleSpec | None:
-        """Return the spec of a file.
-
-        None for packages and files in packages, which Python's own finder finds.
-        """
-        if (
-            not name.startswith(_NAMESPACE_PREFIX)
-            or not path
-            or (Path(path[0]) / "__init__.py").is_file()
-        ):
+        """Return the spec of a Python file; None for what Python's own finder finds."""
+        if not name.startswith(_NAMESPACE_PREFIX) or not path:
             return None
-        spec = FileFinder(path[0], (_SiblingLoader, [".py"])).find_spec(name)
-        return (
-            None if spec is None or spec.loader is None or spec.submodule_search_locations else spec
-        )
+        spec = FileFinder(path[0], (_PackageLoader, [".py"])).find_spec(name)
+        if spec is None or spec.origin is None:
+            return None
+        is_in_package = (Path(path[0]) / "__init__.py").is_file()
+        if not is_in_package and not spec.submodule_search_locations:
+            spec.loader = _SiblingLoader(name, spec.origin)
+        return spec
+
+
+class _PackageLoader(SourceFileLoader):
+    """Loader that uses compiled files only if they are newer than their source.
+
+    Python compares whole seconds and sizes, and would run old code after a quick change.
+    """
+
+    def get_data(self, path: str) -> bytes:
+        """Read a source or compiled file."""
+        if (
+            path != self.path
+            and Path(path).stat().st_mtime_ns <= Path(self.path).stat().st_mtime_ns
+        ):
+            raise OSError(f"{path} is older than its source")
+        return super().get_data(path)
 
 
 class _SiblingLoader(SourceFileLoader):

@@ -14,8 +14,6 @@ Values are exchanged in typed arrays ("ports") that belong to the engine. A step
 conversions, allocations or look-ups.
 """
 
-from __future__ import annotations
-
 import ctypes
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Log messages of components, passed to Python's logging with a limited rate."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Iterator

@@ -8,8 +8,6 @@ CosimError
 └── CheckError        a check, comparison or `build --check` failed (exit code 3)
 """
 
-from __future__ import annotations
-
 import difflib
 import errno
 import re

@@ -4,8 +4,6 @@ Values that JSON does not have are written as others: bytes become {"bytes": hex
 NumPy values become lists and numbers.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from typing import Any
@@ -37,16 +35,6 @@ def parse_object(text: str | bytes) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise ValueError("expected an object")
     return value
-
-
-def copy_json(value: Any) -> Any:
-    """Return a deep copy of a value of objects and lists.
-
-    Five times faster than `copy.deepcopy`.
-    """
-    if isinstance(value, dict):
-        return {key: copy_json(each) for key, each in value.items()}
-    return [copy_json(each) for each in value] if isinstance(value, list) else value
 
 
 def is_number(value: Any) -> bool:

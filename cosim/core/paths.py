@@ -1,7 +1,5 @@
 """Safe access to paths given by users, which may be pipes, devices or link loops."""
 
-from __future__ import annotations
-
 import errno
 import os
 import stat

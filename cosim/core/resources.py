@@ -3,11 +3,12 @@
 The shipped files are scenarios, FMUs, and sources of plant and controllers.
 """
 
-from __future__ import annotations
-
 import os
+import stat
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from tempfile import gettempdir
 
 
 @cache
@@ -32,9 +33,29 @@ def shipped_names(pattern: str) -> list[str]:
 
 
 def cache_directory() -> Path:
-    """Return the cache folder of the user: XDG_CACHE_HOME/cosim, else ~/.cache/cosim."""
+    """Return the cache folder of the user: XDG_CACHE_HOME/cosim, else ~/.cache/cosim.
+
+    Where no home folder can be written, as in many containers, it is a folder for temporary files
+    that belongs to the user.
+    """
     base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "cosim"
+    return Path(base) / "cosim" if base else _default_cache(os.environ.get("HOME"))
+
+
+@cache
+def _default_cache(_home: str | None) -> Path:
+    folder = Path("~/.cache/cosim")
+    with suppress(OSError, RuntimeError):  # the home folder cannot be written, or is not known
+        folder = folder.expanduser()
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder
+    with suppress(OSError):
+        private = Path(gettempdir(), f"cosim-{os.getuid()}")
+        private.mkdir(0o700, exist_ok=True)
+        about = private.lstat()  # others could put libraries into a folder that is not private
+        if about.st_mode == stat.S_IFDIR | 0o700 and about.st_uid == os.getuid():
+            return private
+    return folder
 
 
 def available_processors() -> int:

@@ -3,8 +3,6 @@
 Larger systems are refused before they are expanded.
 """
 
-from __future__ import annotations
-
 import math
 
 from .errors import InputError, Problem

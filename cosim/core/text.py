@@ -3,8 +3,6 @@
 Limits of length, forbidden characters, escape sequences for printing.
 """
 
-from __future__ import annotations
-
 import re
 
 #: longest text that is accepted (characters)

@@ -1,7 +1,5 @@
 """Export of all sources to `fmus/` (`cosim build`), and its manifest."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -59,7 +57,9 @@ def build(
     manifest = read_manifest(root)
     selected = _select_sources(sources, root)
     if sources is None:
-        _remove_orphans(manifest, selected, root)
+        for name in manifest.keys() - {source.manifest_key for source in selected}:
+            for fmu in manifest.pop(name)["fmus"]:
+                (root / fmu).unlink(missing_ok=True)
     results = []
     for source in selected:
         fmus = fmu_files(source, root)
@@ -76,12 +76,6 @@ def build(
         results.append(BuildResult(source.path, fmus))
         report(results[-1])
     return results
-
-
-def _remove_orphans(manifest: dict[str, Any], sources: Sequence[Source], root: Path) -> None:
-    for name in manifest.keys() - {source.manifest_key for source in sources}:
-        for fmu in manifest.pop(name)["fmus"]:
-            (root / fmu).unlink(missing_ok=True)
 
 
 def build_to(

@@ -1,7 +1,5 @@
 """Check that the FMUs in `fmus/` correspond to their sources and behave like a rebuild."""
 
-from __future__ import annotations
-
 import multiprocessing
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -236,7 +234,9 @@ def _record_trace(path: Path, random: np.random.Generator, vary_parameters: bool
         failure = str(error)
     finally:
         component.free()
-    ordered = _variables_in_memory_order(outputs)
+    # the variables in the order of their values in the concatenated arrays
+    places = {dtype: place for place, dtype in enumerate(outputs.arrays)}
+    ordered = sorted(outputs.variables, key=lambda variable: places[variable.dtype])
     names = list(chain.from_iterable(variable.scalar_names for variable in ordered))
     return Trace(component.variables, names, np.array(rows).reshape(len(rows), len(names)), failure)
 
@@ -262,12 +262,6 @@ def _allocate_ports(variables: Sequence[Variable]) -> Ports:
     for variable in variables:
         sizes[variable.dtype] = sizes.get(variable.dtype, 0) + len(variable.scalar_names)
     return Ports(variables, {dtype: np.zeros(size, dtype) for dtype, size in sizes.items()})
-
-
-def _variables_in_memory_order(ports: Ports) -> list[Variable]:
-    """Return the variables in the order of their values in the concatenated arrays."""
-    places = {dtype: place for place, dtype in enumerate(ports.arrays)}
-    return sorted(ports.variables, key=lambda variable: places[variable.dtype])
 
 
 def _concatenate(ports: Ports) -> np.ndarray:

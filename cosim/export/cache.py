@@ -1,7 +1,5 @@
 """FMUs in the user's cache, each with its digest, so that a damaged file is built again."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path

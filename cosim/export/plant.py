@@ -3,8 +3,6 @@
 No other module of cosim names the plant. It is imported only when a function needs it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,6 +1,8 @@
-/* The state of the process that foreign code may change, as bytes that are compared in a microsecond.
+/* The state of the process that foreign code may change, as bytes that are compared in a
+   microsecond.
 
-   They hold the attributes of cosim/process/process_state.py, which restores those that differ. Linux only.                   */
+   They hold the attributes of cosim/process/process_state.py, which restores those that differ.
+   Linux only. */
 
 #define _GNU_SOURCE
 #define PY_SSIZE_T_CLEAN
@@ -21,13 +23,15 @@
 
 #if defined(__x86_64__)
 #include <xmmintrin.h>
-#define MXCSR_CONTROL 0xFFC0u /* rounding, flush to zero, denormals are zero, traps; not the sticky flags */
+/* rounding, flush to zero, denormals are zero, traps; not the sticky flags */
+#define MXCSR_CONTROL 0xFFC0u
 static unsigned float_control(void) { return _mm_getcsr() & MXCSR_CONTROL; }
 #else
 static unsigned float_control(void) { return 0; }
 #endif
 
-enum { MAX_PATH_SIZE = 4096, MASK_SIZE = 8 }; /* bytes; MASK_SIZE: signals 1 to 64, the kernel's size of a mask */
+/* bytes; MASK_SIZE: signals 1 to 64, the kernel's size of a mask */
+enum { MAX_PATH_SIZE = 4096, MASK_SIZE = 8 };
 static const int signals[] = {SIGINT, SIGTERM, SIGSEGV, SIGFPE, SIGABRT, SIGPIPE, SIGCHLD};
 static const int timers[] = {ITIMER_REAL, ITIMER_VIRTUAL, ITIMER_PROF};
 static const int limits[] = {RLIMIT_AS, RLIMIT_CPU, RLIMIT_DATA, RLIMIT_FSIZE, RLIMIT_NOFILE};
@@ -48,7 +52,8 @@ static int has_free_descriptor(void) {
     return 1;
 }
 
-/* The C library reads limits by prlimit64, which takes three times as long as the older system call. */
+/* The C library reads limits by prlimit64, which takes three times as long as the older system
+   call. */
 static void read_limit(int resource, struct rlimit *limit) {
 #if defined(SYS_getrlimit) && defined(__LP64__)
     syscall(SYS_getrlimit, resource, limit);
@@ -61,13 +66,15 @@ static void read_fixed(Fixed *state) {
     memset(state, 0, sizeof *state);
     for (size_t i = 0; i < LENGTH(signals); i++) {
         struct sigaction action;
-        if (sigaction(signals[i], NULL, &action) == 0) memcpy(&state->handlers[i], &action.sa_handler, sizeof(void *));
+        if (sigaction(signals[i], NULL, &action) == 0)
+            memcpy(&state->handlers[i], &action.sa_handler, sizeof(void *));
     }
     for (size_t i = 0; i < LENGTH(limits); i++) read_limit(limits[i], &state->limits[i]);
     for (size_t i = 0; i < LENGTH(timers); i++) {
         struct itimerval value = {0};
         getitimer(timers[i], &value);
-        state->running[i] = value.it_value.tv_sec || value.it_value.tv_usec || value.it_interval.tv_sec || value.it_interval.tv_usec;
+        state->running[i] = value.it_value.tv_sec || value.it_value.tv_usec ||
+                            value.it_interval.tv_sec || value.it_interval.tv_usec;
     }
     sigset_t mask;
     pthread_sigmask(SIG_BLOCK, NULL, &mask);
@@ -75,7 +82,8 @@ static void read_fixed(Fixed *state) {
     state->float_control = float_control();
     state->traps = (unsigned)fegetexcept();
     state->rounding = (unsigned)fegetround();
-    state->file_mode_mask = (unsigned)umask(077); /* safe for a file that another thread creates now */
+    /* safe for a file that another thread creates now */
+    state->file_mode_mask = (unsigned)umask(077);
     umask((mode_t)state->file_mode_mask);
     state->has_free_descriptor = (char)has_free_descriptor();
 }
@@ -100,17 +108,22 @@ static PyObject *encode(PyObject *self, PyObject *unused) {
     char *end = append(PyBytes_AsString(result), (const char *)&fixed, sizeof fixed);
     end = append(end, path, strlen(path) + 1);
     end = append(end, locale, strlen(locale) + 1);
-    for (char **entry = environ; entry && *entry; entry++) end = append(end, *entry, strlen(*entry) + 1);
+    for (char **entry = environ; entry && *entry; entry++)
+        end = append(end, *entry, strlen(*entry) + 1);
     return result;
 }
 
 static PyMethodDef methods[] = {
-    {"encode", encode, METH_NOARGS, "Return the present state of the process; equal bytes mean an equal state."},
+    {"encode", encode, METH_NOARGS,
+     "Return the present state of the process; equal bytes mean an equal state."},
     {NULL, NULL, 0, NULL},
 };
 
 static struct PyModuleDef module = {
-    PyModuleDef_HEAD_INIT, "_process_state", "The state of the process as bytes.", 0, methods, NULL, NULL, NULL, NULL,
+    .m_base = PyModuleDef_HEAD_INIT,
+    .m_name = "_process_state",
+    .m_doc = "The state of the process as bytes.",
+    .m_methods = methods,
 };
 
 PyMODINIT_FUNC PyInit__process_state(void) { return PyModule_Create(&module); }

@@ -4,8 +4,6 @@ The journal names the component. The line comes from the Python stack, which sig
 process write to a file when it crashes or when the supervisor requests it.
 """
 
-from __future__ import annotations
-
 import faulthandler
 import fcntl
 import math

@@ -1,7 +1,5 @@
 """Floating-point mode of this thread, which foreign code may change."""
 
-from __future__ import annotations
-
 import ctypes
 import platform
 import struct

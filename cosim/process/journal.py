@@ -9,8 +9,6 @@ word, which is written at once, and a counter of changes (`CHANGE_COUNT`) increa
 deadline changes. In the stepping loop only the executor's marker moves, which costs no call.
 """
 
-from __future__ import annotations
-
 import ctypes
 import math
 import mmap

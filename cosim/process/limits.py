@@ -1,6 +1,4 @@
-"""Session and resource limits of a child process."""
-
-from __future__ import annotations
+"""Session, resource limits and end of a child process."""
 
 import ctypes
 import os
@@ -31,6 +29,19 @@ def detach(parent: int | None) -> None:
     os.dup2(null, 0)
     if null != 0:
         os.close(null)
+
+
+def skip_exit_handlers() -> None:
+    """End this process at once if foreign code calls exit(), after its buffered output is written.
+
+    The exit handlers that a forked process inherits belong to libraries whose threads and
+    descriptors it lacks: they may crash or never end. Systems whose C library lacks on_exit run
+    them.
+    """
+    library = ctypes.CDLL(None)
+    if hasattr(library, "on_exit"):
+        library.on_exit(library._exit, None)
+        library.__cxa_atexit(library.fflush, None, None)  # comes first, and writes all streams
 
 
 def lower_limit(kind: int, value: int | None) -> None:

@@ -1,7 +1,5 @@
 """State of other processes, read from /proc."""
 
-from __future__ import annotations
-
 import os
 from contextlib import suppress
 from pathlib import Path

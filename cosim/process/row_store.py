@@ -1,7 +1,5 @@
 """Storage of recorded rows in memory, or in a file that may be larger than memory."""
 
-from __future__ import annotations
-
 import ctypes
 import mmap
 import os

@@ -119,8 +119,9 @@ class RowsFile:
         try:
             data = parse_object((folder / HEADER_FILE).read_text(encoding="utf-8"))
             columns = [Column(**column) for column in data["columns"]]
-            pairs = {key: [tuple(pair) for pair in data[key]] for key in ("calls", "texts")}
-            return cls(folder, RowLayout(**data | {"columns": columns} | pairs))
+            for key in ("calls", "texts"):
+                data[key] = [tuple(pair) for pair in data[key]]
+            return cls(folder, RowLayout(**data | {"columns": columns}))
         except (OSError, ValueError, TypeError, LookupError):
             return None
 

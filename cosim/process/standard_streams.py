@@ -1,7 +1,5 @@
 """Standard streams that survive a closed pipe or a full disk, and output of foreign code."""
 
-from __future__ import annotations
-
 import codecs
 import errno
 import io

@@ -5,8 +5,6 @@ attributed to the component and function that were called, at no cost per step. 
 are in a file, which survives the child.
 """
 
-from __future__ import annotations
-
 import ctypes
 import mmap
 import os
@@ -45,7 +43,7 @@ from .journal import (
     set_current_journal,
     watch_forks,
 )
-from .limits import detach, lower_limit
+from .limits import detach, lower_limit, skip_exit_handlers
 from .process_state import reserve_descriptors
 from .process_status import child_processes, waiting_time
 from .standard_streams import ForeignOutput, protected_stream
@@ -160,6 +158,7 @@ def run_child(
     """
     code = 70
     try:
+        skip_exit_handlers()
         _isolate(output, supervisor)
         write_stack_on_signals(stack)
         tempfile.tempdir = os.environ["TMPDIR"] = temporary_folder

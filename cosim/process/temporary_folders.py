@@ -3,8 +3,6 @@
 If it was killed, a later process removes them.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile

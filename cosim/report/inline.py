@@ -35,7 +35,8 @@ def result_as_html(result: Result) -> str:
     lines += [f"<p>ended early: {html.escape(failure)}</p>"] if failure else []
     if result.kpis:
         lines += [
-            "<table><thead><tr><th>KPI</th><th>value</th><th>unit</th><th>check</th></tr></thead><tbody>"
+            "<table><thead><tr><th>KPI</th><th>value</th><th>unit</th><th>check</th></tr></thead>"
+            "<tbody>"
         ]
         units = result.metadata.get("kpi_units", {})
         checks = {outcome.check["kpi"]: outcome for outcome in result.checks}

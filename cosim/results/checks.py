@@ -1,7 +1,5 @@
 """Checks of KPIs against the limits of a scenario, and of recorded signals for NaN and infinity."""
 
-from __future__ import annotations
-
 import logging
 import math
 import operator

@@ -3,8 +3,6 @@
 First column `time`, quoted names, no row of units, Booleans as 0 and 1, exact numbers.
 """
 
-from __future__ import annotations
-
 import csv
 import re
 from collections import Counter
@@ -101,7 +99,17 @@ def read_csv(path: str | Path) -> Recording:
     recording = Recording(
         time, dict(zip(header[1:], columns, strict=True)), dict.fromkeys(header[1:], "")
     )
-    return _convert_time(path, recording)
+    try:
+        time = recording.time.astype(np.float64)
+    except ValueError as error:
+        raise InputError(Problem(f"the column time: {error}", str(path))) from None
+    if not np.isfinite(time).all():
+        raise InputError(Problem("the column time holds values that are not finite", str(path)))
+    if back := next((pair for pair in pairwise(time) if pair[1] < pair[0]), None):
+        raise InputError(
+            Problem(f"time goes back from {back[0]:.12g} s to {back[1]:.12g} s", str(path))
+        )
+    return Recording(time, recording.columns, recording.units)
 
 
 def _check_table(path: Path, header: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
@@ -139,20 +147,6 @@ def _to_column(cells: Sequence[float] | Sequence[str]) -> np.ndarray:
         with suppress(ValueError, OverflowError):
             return np.array(texts, dtype=kind)
     return np.array(texts, dtype=object)
-
-
-def _convert_time(path: Path, recording: Recording) -> Recording:
-    try:
-        time = recording.time.astype(np.float64)
-    except ValueError as error:
-        raise InputError(Problem(f"the column time: {error}", str(path))) from None
-    if not np.isfinite(time).all():
-        raise InputError(Problem("the column time holds values that are not finite", str(path)))
-    if back := next((pair for pair in pairwise(time) if pair[1] < pair[0]), None):
-        raise InputError(
-            Problem(f"time goes back from {back[0]:.12g} s to {back[1]:.12g} s", str(path))
-        )
-    return Recording(time, recording.columns, recording.units)
 
 
 #: size of a number in a CSV file (bytes), approximately
@@ -232,7 +226,7 @@ def parse_rows(path: Path, text: str) -> tuple[list[str], list[list[str]]]:
         InputError: The text is empty, or has a cell above `MAX_TEXT_LENGTH`.
     """
     csv.field_size_limit(max(csv.field_size_limit(), MAX_TEXT_LENGTH))
-    reader = csv.reader(StringIO(text, newline=""))
+    reader = csv.reader(StringIO(text, newline=""), skipinitialspace=True)
     try:
         rows = list(reader)
     except csv.Error as error:
@@ -263,6 +257,6 @@ def parse_number_rows(text: str) -> tuple[list[str], list[list[float]]] | None:
         rows = pydantic_core.from_json(
             b"[[" + data.removesuffix(b"\n").replace(b"\n", b"],[") + b"]]"
         )
-        return next(csv.reader([header])), rows
+        return next(csv.reader([header], skipinitialspace=True)), rows
     except (ValueError, csv.Error, StopIteration):
         return None

@@ -4,8 +4,6 @@ Every output of every command goes through `writing_atomically`. It follows symb
 replaces only regular files; a FIFO, a character device and /dev/stdout are written to directly.
 """
 
-from __future__ import annotations
-
 import errno
 import glob
 import json

@@ -3,8 +3,6 @@
 A Parquet file keeps the types of the signals and has about a fifth of the size of CSV.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """References: few rows of a run with which later runs are compared, and their provenance."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Mapping

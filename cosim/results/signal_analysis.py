@@ -1,7 +1,5 @@
 """Errors, integrals and step responses of recorded signals."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -8,6 +8,7 @@ creation of the component. Another package adds a kind by an entry point of the 
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -29,7 +30,12 @@ from ..components.fmi import (
 from ..components.fmi.settings import Method
 from ..components.python_import import load_object
 from ..core.component import Component, Variable
-from ..core.errors import InputError, nearest_file
+from ..core.errors import (
+    PASS_THROUGH_EXCEPTIONS,
+    InputError,
+    describe_exception,
+    nearest_file,
+)
 from ..core.paths import is_file, resolve_path
 from ..export.foreign import add_binary
 from .schema_types import (
@@ -48,6 +54,8 @@ from .schema_types import (
 )
 
 if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
     from ..components.input_table import InputTable
 
 #: group of the entry points by which other packages add kinds of sources
@@ -430,33 +438,56 @@ def component_kinds(keys: Iterable[str] | None = ()) -> Mapping[str, type[Compon
     """Return the kinds of sources of components by key.
 
     Those of other packages are only looked up, which takes time, if one of `keys` is no key of a
-    kind of cosim, or if `keys` is None.
+    kind of cosim, or if `keys` is None. One that cannot be used is left out.
+
+    Raises:
+        InputError: One of `keys` belongs to a kind that cannot be used.
     """
     if keys is not None and _OWN_KEYS.issuperset(keys):
         return _COMPONENT_KINDS
-    return _COMPONENT_KINDS | _kinds_of_packages()
+    kinds, problems = _kinds_of_packages()
+    for name in keys or ():
+        if name in problems:
+            raise InputError(problems[name])
+    return _COMPONENT_KINDS | kinds
 
 
 @cache
-def _kinds_of_packages() -> dict[str, type[ComponentSource]]:
-    """Return the kinds that the entry points of installed packages name."""
+def _kinds_of_packages() -> tuple[dict[str, type[ComponentSource]], dict[str, str]]:
+    """Return the kinds that the entry points of installed packages name, and why others are none.
+
+    A fault in one package does not keep scenarios without its key from being read.
+    """
     from importlib.metadata import entry_points
 
     kinds: dict[str, type[ComponentSource]] = {}
+    problems: dict[str, str] = {}
     for entry in entry_points(group=ENTRY_POINTS):
         who = f'the kind of sources "{entry.name}" of the package {entry.dist and entry.dist.name}'
         try:
-            kind = entry.load()
-        except Exception as error:
-            raise InputError(f"{who} cannot be imported: {error}") from error
-        if not (isinstance(kind, type) and issubclass(kind, ComponentSource)):
-            raise InputError(f"{who}: expected a subclass of ComponentSource, found {kind!r}")
-        if entry.name != getattr(kind, "KEY", "") or entry.name not in kind.model_fields:
-            raise InputError(f'{who}: expected KEY = "{entry.name}", and a field of this name')
-        if entry.name in _OWN_KEYS or entry.name in kinds:
-            raise InputError(f"{who}: this key is taken")
-        kinds[entry.name] = kind
-    return kinds
+            kinds[entry.name] = _load_kind(entry, entry.name in kinds)
+        except PASS_THROUGH_EXCEPTIONS:
+            raise
+        except InputError as error:
+            problems[entry.name] = f"{who}: {error}"
+        except BaseException as error:  # a package that is imported may end the program
+            problems[entry.name] = f"{who} cannot be imported: {describe_exception(error)}"
+    for name, problem in problems.items():
+        kinds.pop(name, None)
+        logging.getLogger("cosim").warning("%s; it is left out", problem)
+    return kinds, problems
+
+
+def _load_kind(entry: EntryPoint, is_taken: bool) -> type[ComponentSource]:
+    """Import a kind of another package and check it."""
+    kind = entry.load()
+    if not (isinstance(kind, type) and issubclass(kind, ComponentSource)):
+        raise InputError(f"expected a subclass of ComponentSource, found {kind!r}")
+    if entry.name != getattr(kind, "KEY", "") or entry.name not in kind.model_fields:
+        raise InputError(f'expected KEY = "{entry.name}", and a field of this name')
+    if entry.name in _OWN_KEYS or is_taken:
+        raise InputError("this key is taken")
+    return kind
 
 
 def kind_of(entry: Mapping[str, Any]) -> type[ComponentSource]:

@@ -5,8 +5,6 @@ changed by an object. Rules that
 concern several keys hold for the merged file alone and are left out.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import Any

@@ -10,8 +10,6 @@ They include the values that the caller sets.
   are taken from these by their names.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count, takewhile

@@ -3,8 +3,6 @@
 The values of arguments are checked against the annotations of their parameters.
 """
 
-from __future__ import annotations
-
 import ast
 import json
 from collections.abc import Iterator, Mapping, Sequence

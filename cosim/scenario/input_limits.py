@@ -103,10 +103,15 @@ def _set_values(prepared: PreparedRun) -> Iterator[tuple[str, Variable, Any, str
 
     Parameters, settings and events set them.
     """
-    places = _assigned_places(prepared)
+    # place of the last assignment of each start value, by component and variable
+    places: dict[tuple[str, str], str] = {}
+    for node, name, _, where in iterate_assignments(prepared.root, prepared.assignments):
+        with suppress(UnknownNameError):
+            for target in resolve_name(node, name, ("parameters", "inputs"), include_inner=True):
+                places[target.component, target.prefix.partition("[")[0]] = where
     changes = [
         (prepared.system.start_values, ""),
-        *((event.values, event.where) for event in prepared.settings.events),
+        *((event.values, event.where) for event in prepared.plan.settings.events),
     ]
     for values_by_component, where in changes:
         for name, values in values_by_component.items():
@@ -114,16 +119,6 @@ def _set_values(prepared: PreparedRun) -> Iterator[tuple[str, Variable, Any, str
                 if variable.causality == "input" and variable.name in values:
                     place = where or places.get((name, variable.name), "")
                     yield name, variable, values[variable.name], place
-
-
-def _assigned_places(prepared: PreparedRun) -> Mapping[tuple[str, str], str]:
-    """Return the place of the last assignment of each start value, by component and variable."""
-    places = {}
-    for node, name, _, where in iterate_assignments(prepared.root, prepared.assignments):
-        with suppress(UnknownNameError):
-            for target in resolve_name(node, name, ("parameters", "inputs"), include_inner=True):
-                places[target.component, target.prefix.partition("[")[0]] = where
-    return places
 
 
 def _describe(excess: _Excess, count: int) -> str:
@@ -204,7 +199,7 @@ def _find_excesses(
         return
     recorded = {
         end: recording.columns[name]
-        for name, end in prepared.settings.columns.items()
+        for name, end in prepared.plan.settings.columns.items()
         if name in recording.columns
     }
     feeding: dict[Endpoint, list[Connection]] = {}

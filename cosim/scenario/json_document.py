@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from ..core.errors import InputError, Problem, abbreviate_names, nearest_file, nearest_name
-from ..core.json_values import copy_json
 from ..core.paths import open_text
 from ..core.text import acceptable_text, count_noun, shorten, text_problem
 
@@ -72,7 +71,11 @@ class Document:
         if setting := next(
             (path[:n] for n in range(len(path), 0, -1) if path[:n] in self.settings), None
         ):
-            return self._where_set(path, setting)
+            text = f'setting "{self.settings[setting]}"'
+            for n in range(len(path), len(setting) - 1, -1):
+                if document := self.set_documents.get(path[:n]):
+                    return f"{text}: {document.where(path[n:])}"
+            return text if path == setting else f"{text}: {json_path(path)}"
         while known and known not in self.origins and known not in self.offsets:
             known = known[:-1]
         if (origin := self.origins.get(known)) and origin.document is not self:
@@ -80,14 +83,6 @@ class Document:
         if self.is_dict:
             return f"scenario: {json_path(path)}"
         return f"{self.position(self.offsets.get(known, 0))}: {json_path(path)}"
-
-    def _where_set(self, path: JsonPath, setting: JsonPath) -> str:
-        """Return the JSON pointer of a setting, and the position in the file that it names."""
-        text = f'setting "{self.settings[setting]}"'
-        for n in range(len(path), len(setting) - 1, -1):
-            if document := self.set_documents.get(path[:n]):
-                return f"{text}: {document.where(path[n:])}"
-        return text if path == setting else f"{text}: {json_path(path)}"
 
     def _with_indices(self, path: Sequence[str | int]) -> JsonPath:
         """Return a path whose keys are numbers where the value is a list."""
@@ -210,6 +205,16 @@ def read_document(file: Path) -> Document:
         settings={},
         set_documents={},
     )
+
+
+def copy_json(value: Any) -> Any:
+    """Return a deep copy of a value of objects and lists.
+
+    Five times faster than `copy.deepcopy`.
+    """
+    if isinstance(value, dict):
+        return {key: copy_json(each) for key, each in value.items()}
+    return [copy_json(each) for each in value] if isinstance(value, list) else value
 
 
 @lru_cache(8)  # studies read the same files for each run

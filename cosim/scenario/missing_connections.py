@@ -4,8 +4,6 @@ Outputs that have the names of inputs, in the file in which the connection is mi
 connections that a warning proposes.
 """
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections import defaultdict

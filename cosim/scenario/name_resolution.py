@@ -1,7 +1,5 @@
 """Resolution of the names in a scenario to components and their variables."""
 
-from __future__ import annotations
-
 import re
 from bisect import bisect_left
 from collections import defaultdict

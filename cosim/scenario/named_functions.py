@@ -1,7 +1,5 @@
 """The Python functions that a scenario names: KPIs, figures and the scene of the 3-D replay."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Callable, Collection, Iterator, Sequence

@@ -14,7 +14,6 @@ from typing import Any
 from ..components.python_import import package_files
 from ..core import paths, resources
 from ..core.errors import InputError, Problem
-from ..core.json_values import copy_json
 from ..core.size_limits import (
     MAX_COMPONENTS,
     MAX_CONNECTIONS,
@@ -28,7 +27,7 @@ from .component_schema import change_paths
 from .evaluation_schema import CallSpec
 from .extension import expand_document, read_system_document
 from .file_paths import find_scenario, relocating
-from .json_document import Document, pointer_keys, set_value
+from .json_document import Document, copy_json, pointer_keys, set_value
 from .schema import NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
 from .schema_types import accepted
 from .settings import apply_settings, document_of_dict
@@ -192,17 +191,6 @@ def load_scenario(
         document = expand_document(document_of_dict(scenario))
     else:
         document = read_system_document(find_scenario(scenario))
-    _refuse_study(document)
-    variables, problems = apply_settings(document, settings or {}, folder)
-    reader = _SystemReader()
-    file = reader.read(document, ScenarioSpec, ())
-    check_expanded_size(file)
-    problems += [*reader.problems, *_find_seed_problems(file)]
-    return Scenario(_make_node(file), problems, variables)
-
-
-def _refuse_study(document: Document) -> None:
-    """Raise InputError if a document is a sweep, a tuning or a search for the worst case."""
     value = document.value if isinstance(document.value, dict) else {}
     for key, command in (
         ("factors", "sweep"),
@@ -212,6 +200,12 @@ def _refuse_study(document: Document) -> None:
         if key in value and "scenario" in value and "components" not in value:
             text = f"expected a scenario, found a file for `cosim {command}`"
             raise InputError(Problem(text, document.where(("scenario",))))
+    variables, problems = apply_settings(document, settings or {}, folder)
+    reader = _SystemReader()
+    file = reader.read(document, ScenarioSpec, ())
+    check_expanded_size(file)
+    problems += [*reader.problems, *_find_seed_problems(file)]
+    return Scenario(_make_node(file), problems, variables)
 
 
 def _find_seed_problems(file: SystemFile) -> Iterator[Problem]:

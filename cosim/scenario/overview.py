@@ -3,8 +3,6 @@
 Components, stages, connections and software.
 """
 
-from __future__ import annotations
-
 import platform
 from collections.abc import Iterable, Mapping
 from functools import cache

@@ -86,7 +86,7 @@ def unconnected_inputs(prepared: PreparedRun) -> VariablesByEndpoint:
     """Return the inputs that no connection, start value or event sets, with their variables."""
     system = prepared.system
     connected = {connection.target for connection in system.connections}
-    changes = [system.start_values, *(event.values for event in prepared.settings.events)]
+    changes = [system.start_values, *(event.values for event in prepared.plan.settings.events)]
     assigned: set[tuple[str, str]] = set()
     for values in changes:
         for component, own in values.items():
@@ -105,7 +105,7 @@ def _large_steps(prepared: PreparedRun) -> Iterator[Problem]:
 
     FMUs for Model Exchange are left out, because their solver has a step of its own.
     """
-    system, macro_step = prepared.system, prepared.settings.step_size
+    system, macro_step = prepared.system, prepared.plan.settings.step_size
     groups: dict[Fraction, dict[str, Fraction]] = defaultdict(dict)
     for name, component in system.components.items():
         description = getattr(component, "description", None)
@@ -141,8 +141,8 @@ def _missing_reference(prepared: PreparedRun) -> Iterator[Problem]:
 
 
 def _late_events(prepared: PreparedRun) -> Iterator[Problem]:
-    stop = prepared.settings.stop_time
-    for event in prepared.settings.events:
+    stop = prepared.plan.settings.stop_time
+    for event in prepared.plan.settings.events:
         if event.time > stop:
             text = (
                 f"this event does not happen: {float(event.time):g} s is after the stop time "
@@ -153,7 +153,7 @@ def _late_events(prepared: PreparedRun) -> Iterator[Problem]:
 
 def _late_kpis(prepared: PreparedRun) -> Iterator[Problem]:
     """Yield a warning for every KPI whose argument `start` (s) is after the end of the run."""
-    stop = prepared.settings.stop_time
+    stop = prepared.plan.settings.stop_time
     for kpi in prepared.spec.kpis:
         start = kpi.arguments.get("start")
         if isinstance(start, int | float) and start > stop:

@@ -26,7 +26,6 @@ from ..core.time_grid import exact_fraction, fraction_text
 from ..engine.pacer import LatePolicy, Stopwatch
 from ..engine.plan import Plan
 from ..engine.plan_run import free_components
-from ..engine.settings import Settings
 from ..process.float_mode import default_float_mode
 from ..process.journal import Deadlines, current_journal
 from ..process.process_state import exclusive_process_state
@@ -69,7 +68,7 @@ class PreparedRun:
     timing: Mapping[str, float]
 
     def __repr__(self) -> str:
-        system, settings = self.system, self.settings
+        system, settings = self.system, self.plan.settings
         times = (
             f"{float(settings.start_time):g} s to {float(settings.stop_time):g} s in steps of "
             f"{float(settings.step_size):g} s"
@@ -83,11 +82,6 @@ class PreparedRun:
     def system(self) -> System:
         """Components and connections."""
         return self.plan.system
-
-    @property
-    def settings(self) -> Settings:
-        """Time span, step size, recorded signals and events."""
-        return self.plan.settings
 
     @property
     def document(self) -> Document:
@@ -126,7 +120,7 @@ class PreparedRun:
 
         These are no problems of the run itself, because sweeps draw no figures.
         """
-        return list(signal_problems(self.root, "figures", self.settings.columns))
+        return list(signal_problems(self.root, "figures", self.plan.settings.columns))
 
     @cached_property
     # paths may be relative, and a component of another thread may change the working directory

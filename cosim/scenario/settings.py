@@ -4,8 +4,6 @@ A setting changes a value by its JSON pointer or by the name of a variable. Comp
 be Python classes and objects.
 """
 
-from __future__ import annotations
-
 import inspect
 import json
 import math

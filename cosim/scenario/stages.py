@@ -1,7 +1,5 @@
 """Stages of a scenario and its nested systems, and the recommendation of a better algorithm."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import permutations
 from typing import NamedTuple

@@ -17,11 +17,10 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from ..core.errors import Problem, did_you_mean, nearest_name
-from ..core.json_values import copy_json
 from ..core.text import REPLACEMENT, count_noun
 from .component_schema import component_model
 from .component_sources import ComponentSource
-from .json_document import Document
+from .json_document import Document, copy_json
 from .schema import SystemSpec
 from .schema_types import INVALID, PlacedError, hint_at_quotes
 
@@ -68,7 +67,9 @@ def validate_document(document: Document, kind: type[S]) -> tuple[S, list[Proble
         for detail in result.errors(include_url=False):
             path = _error_path(detail)
             if detail["type"] == "extra_forbidden":
-                _remove_key(value, path)
+                owner = _owner(value, path)
+                if isinstance(owner, dict):  # else it has already been removed
+                    owner.pop(path[-1], None)
                 invalid_keys |= {key for key in _meant_keys(kind, path) if len(path) == 1}
             else:
                 part = path[:-1] if detail["type"] == "missing" and len(path) > 1 else path
@@ -229,13 +230,6 @@ def _is_number(value: Any) -> bool:
 def _shorten_json(value: Any) -> str:
     text = json.dumps(value, ensure_ascii=False, default=str)
     return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _remove_key(value: Any, path: Sequence[str | int]) -> None:
-    """Remove an unknown key, unless the object that contained it has already been removed."""
-    owner = _owner(value, path)
-    if isinstance(owner, dict):
-        owner.pop(path[-1], None)
 
 
 def _owner(value: Any, path: Sequence[str | int]) -> Any:

@@ -1,7 +1,5 @@
 """Check of values against the variables to which a scenario or a Python caller assigns them."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Sequence
@@ -107,18 +105,6 @@ def start_values(variable: Variable) -> Sequence[Any]:
     return start if isinstance(start, tuple) else (start,) * size
 
 
-def _enumeration_value(variable: Variable, value: Any) -> Any:
-    """Return the number of an enumeration item that is given by its name or its number."""
-    items = dict(variable.items)
-    if value in items:
-        return items[value]
-    if value in items.values() and not isinstance(value, bool):
-        return value
-    valid = ", ".join(f"{name} ({number})" for name, number in items.items())
-    hint = did_you_mean(value, items) if isinstance(value, str) else ""
-    raise ValueError(f'"{variable.name}" is one of {valid}, found {quote_value(value)}{hint}')
-
-
 def _scalar_value(variable: Variable, value: Any) -> Any:
     """Return a scalar in the type of the variable.
 
@@ -127,7 +113,14 @@ def _scalar_value(variable: Variable, value: Any) -> Any:
     if isinstance(value, str) and (problem := text_problem(value)):
         raise ValueError(f'"{variable.name}": {problem}')
     if variable.items:
-        return _enumeration_value(variable, value)
+        items = dict(variable.items)
+        if value in items:
+            return items[value]
+        if value in items.values() and not isinstance(value, bool):
+            return value
+        valid = ", ".join(f"{name} ({number})" for name, number in items.items())
+        hint = did_you_mean(value, items) if isinstance(value, str) else ""
+        raise ValueError(f'"{variable.name}" is one of {valid}, found {quote_value(value)}{hint}')
     if variable.type == "Binary" and isinstance(value, str):
         try:
             return parse_binary(value)

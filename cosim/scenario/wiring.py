@@ -1,7 +1,5 @@
 """Expansion of the connections of a scenario, which may use prefixes, to connections of scalars."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress

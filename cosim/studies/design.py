@@ -4,8 +4,6 @@ Samples are drawn by `scipy.stats.qmc` in the unit cube. Every factor maps a coo
 a level, by the inverse of its distribution function.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -3,8 +3,6 @@
 `cosim.sweep`, `cosim.tune`, `cosim.worst_case` and `cosim.regress`.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -194,13 +194,6 @@ class SweepSpec(StudySpec):
             if unknown := [name for name in group if name not in columns]:
                 hint = did_you_mean(unknown[0], columns)
                 raise PlacedError(f'"by" names no factor "{unknown[0]}"{hint}', "by", i)
-        self._check_maps()
-        if self.design.kind == "full_factorial":
-            check_level_counts(self.factors)
-        return self
-
-    def _check_maps(self) -> None:
-        """Raise PlacedError if a factor of a map does not exist or has no levels."""
         sampled = self.design.kind != "full_factorial"
         known = [each.name for each in self.factors if each.has_labels(sampled)]
         known += ["seed"] if self.seeds else []
@@ -209,6 +202,9 @@ class SweepSpec(StudySpec):
                 hint = did_you_mean(unknown[0], known)
                 text = f'"maps" names no factor with levels "{unknown[0]}"{hint}'
                 raise PlacedError(text, "maps", i)
+        if self.design.kind == "full_factorial":
+            check_level_counts(self.factors)
+        return self
 
     def run_counts(self) -> dict[CountPath, int]:
         """Return the numbers of samples or levels, and of seeds."""

@@ -32,8 +32,8 @@ from .bullet import create_compound_shape, pybullet, set_dynamics
 from .clearance import BoundingBox
 
 if TYPE_CHECKING:
+    from ..catalogue import Model
     from ..placement import VehiclePlacement
-    from ..vehicles.model import Model
     from .compiled_equations import CompiledEquations
 
 #: first x coordinate of inactive bodies (m), beyond the reach of any vehicle, and distance between

@@ -30,7 +30,7 @@ from cosim.results.files import writing_atomically
 from ..vehicles.common.interface import WORLD_OUTPUTS
 
 if TYPE_CHECKING:
-    from ..vehicles.model import Model
+    from ..catalogue import Model
 
 #: sys.platform -> folder of FMI 2.0 binaries, suffix of shared libraries
 _PLATFORMS = {

@@ -3,8 +3,6 @@
 Loads are constant in the world frame over a step.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

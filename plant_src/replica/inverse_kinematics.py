@@ -4,8 +4,6 @@ Equations 14 to 20 of the paper as in the published code: accelerations are alon
 and right axes for every psi, although the paper calls them inertial.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """KPIs that compare the replica with the published simulator, in SI units."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise

@@ -5,8 +5,6 @@ inside the loops angles are in degrees, as the published gains require. Two publ
 kept: world velocities are used as forward and left velocities, and the yaw error is not wrapped.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Published guidance and autopilot of the vessel."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -5,8 +5,6 @@ into `sub_steps` (published: two of 5 ms) and applies gravity. This plant is for
 `plant_src/world.py` is the accurate one.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

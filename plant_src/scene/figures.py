@@ -1,7 +1,5 @@
 """Rendered figures of a mission."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -50,7 +48,15 @@ def ghosts(
             vehicles.
     """
     mission = mission_of_result(result)
-    rows = _ghost_rows(mission, start, stop, interval)
+    time, landing = mission.result.time, mission.landing_rows()
+    last = time[landing[-1]] if stop is None else min(stop, time[-1])
+    first = time[landing[0]] if start is None else start
+    if not interval > 0 or last < first:
+        raise InputError(
+            f"nothing to show from {first:g} s to {last:g} s in steps of {interval:g} s"
+        )
+    times = last - interval * np.arange(int((last - first) / interval + 1e-9) + 1)
+    rows = [int(row) for row in np.searchsorted(time, times[::-1] - 1e-9)]
     width, height = pixels
     with Scene(mission) as scene:
         picture = scene.render(
@@ -62,21 +68,6 @@ def ghosts(
     axes.set_axis_off()
     _write_times(axes, mission, rows, camera, width, height)
     return figure
-
-
-def _ghost_rows(
-    mission: Mission, start: float | None, stop: float | None, interval: float
-) -> list[int]:
-    """Return rows every `interval` (s), counted back from the last time shown."""
-    time, landing = mission.result.time, mission.landing_rows()
-    last = time[landing[-1]] if stop is None else min(stop, time[-1])
-    first = time[landing[0]] if start is None else start
-    if not interval > 0 or last < first:
-        raise InputError(
-            f"nothing to show from {first:g} s to {last:g} s in steps of {interval:g} s"
-        )
-    times = last - interval * np.arange(int((last - first) / interval + 1e-9) + 1)
-    return [int(row) for row in np.searchsorted(time, times[::-1] - 1e-9)]
 
 
 def _write_times(

@@ -13,10 +13,9 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from ..catalogue import default_model
+from ..catalogue import Model, default_model
 from ..placement import Obstacle
 from ..vehicles.common.shapes import Body, Quaternion, Shape, Vector
-from ..vehicles.model import Model
 from ..vehicles.multirotor.airframe import Airframe, Rotor
 from ..vehicles.strider import parameters as strider_geometry
 from ..vehicles.strider.parameters import (

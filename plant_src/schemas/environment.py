@@ -3,8 +3,6 @@
 `environment/settings.py` checks the values and explains the keys.
 """
 
-from __future__ import annotations
-
 from ..environment.sea import (
     GAMMA,
     MAX_COMPONENTS,

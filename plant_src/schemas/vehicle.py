@@ -1,7 +1,5 @@
 """JSON Schema of vehicle files, for editors; the readers of the families check the values."""
 
-from __future__ import annotations
-
 from ..catalogue import FAMILIES
 from ..vehicles.multirotor import airframe as multirotor
 from ..vehicles.planar_vessel import planar_vessel as planar

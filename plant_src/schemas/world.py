@@ -5,8 +5,6 @@
 Defaults, limits and lists of names are those of the readers.
 """
 
-from __future__ import annotations
-
 from ..placement import CONCRETE, DRY
 from .environment import ENVIRONMENT_SCHEMAS
 from .parts import (

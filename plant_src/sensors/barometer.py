@@ -1,7 +1,5 @@
 """Barometer with the pressure altitude of the international standard atmosphere (ISO 2533)."""
 
-from __future__ import annotations
-
 from .counter_based_noise import advance_gauss_markov
 from .signal_component import Measurement, SampledSensor, timing_variables
 from .variable_declarations import real_parameter, real_variable, seed_parameter

@@ -1,7 +1,5 @@
 """Onboard camera that writes PNG files, rendered in software without a display."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Counter-based random numbers: a pure function of a seed and a sample number."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from hashlib import sha256

@@ -3,8 +3,6 @@
 Its measurements come from the vessel's GNSS receiver and from a marker on the deck.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from .navigation import History

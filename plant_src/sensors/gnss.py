@@ -6,8 +6,6 @@ Sources of the default values:
 - [M8N] u-blox NEO-M8N, data sheet UBX-15031086
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

@@ -20,8 +20,6 @@ Sources of the default values; [typical] is a common value that no data sheet ha
   data sheet
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Three-axis magnetometer with the heading of a levelled compass."""
 
-from __future__ import annotations
-
 import math
 
 from cosim.core.component import Variable

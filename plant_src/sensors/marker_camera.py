@@ -4,8 +4,6 @@ Camera axes: x to the right of the picture, y down, z along the view. A camera w
 straight down, the nose of the vehicle at the top of the picture; with tilt pi/2 it looks ahead.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -8,8 +8,6 @@ M.-D. Hua, "Attitude estimation for accelerated vehicles using GPS/INS measureme
 Engineering Practice 18 (2010).
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Sequence
@@ -156,7 +154,11 @@ class Navigation(SignalComponent):
         """Start the alignment with the first measurements."""
         i = self.inputs
         self._position, self._velocity = i[_FIX_POSITION], (0.0, 0.0, 0.0)
-        self._orientation = self._level_attitude()
+        east, north, _ = self.parameters["earth"]
+        forward, left, _ = self.inputs[_FIELD]
+        self._orientation = quaternion_from_rotation_vector(
+            (0.0, 0.0, math.atan2(north, east) - math.atan2(left, forward))
+        )
         self._gyro_bias, self._force_bias = i[_RATES], (i[0], i[1], i[2] - GRAVITY)
         self._history, self._alignment_count = History(), 1
         self._fix_time, self._field_time = i[_FIX_TIME], i[_FIELD_TIME]
@@ -165,7 +167,13 @@ class Navigation(SignalComponent):
     def advance(self, now: float, step_size: float) -> None:
         """Align, or integrate the IMU over one step and apply new measurements."""
         if now - self.start_time < self.parameters["alignment_time"]:
-            self._align()
+            i = self.inputs
+            self._alignment_count += 1
+            share = 1 / self._alignment_count
+            self._gyro_bias = _interpolate(self._gyro_bias, i[_RATES], share)
+            self._force_bias = _interpolate(self._force_bias, (i[0], i[1], i[2] - GRAVITY), share)
+            self._position = _interpolate(self._position, i[_FIX_POSITION], share)
+            self._correct_heading(share, 0.0)
         else:
             self._integrate(step_size)
             self._history.add(now, (*self._position, *self._velocity))
@@ -175,24 +183,6 @@ class Navigation(SignalComponent):
                 self._correct_heading(self.parameters["heading_gain"], self.parameters["bias_gain"])
         self._fix_time, self._field_time = self.inputs[_FIX_TIME], self.inputs[_FIELD_TIME]
         self._publish()
-
-    def _align(self) -> None:
-        """Update the running means of biases, position and heading."""
-        i = self.inputs
-        self._alignment_count += 1
-        share = 1 / self._alignment_count
-        self._gyro_bias = _interpolate(self._gyro_bias, i[_RATES], share)
-        self._force_bias = _interpolate(self._force_bias, (i[0], i[1], i[2] - GRAVITY), share)
-        self._position = _interpolate(self._position, i[_FIX_POSITION], share)
-        self._correct_heading(share, 0.0)
-
-    def _level_attitude(self) -> Quaternion:
-        """Return the level attitude with the heading of the measured field."""
-        east, north, _ = self.parameters["earth"]
-        forward, left, _ = self.inputs[_FIELD]
-        return quaternion_from_rotation_vector(
-            (0.0, 0.0, math.atan2(north, east) - math.atan2(left, forward))
-        )
 
     def _integrate(self, h: float) -> None:
         """Integrate rates and specific force over a step `h` (s)."""

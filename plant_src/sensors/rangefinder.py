@@ -1,7 +1,5 @@
 """Rangefinder: distance along a beam to a deck, a platform or the water, by ray casting."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from itertools import chain

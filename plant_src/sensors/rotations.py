@@ -3,8 +3,6 @@
 Quaternions are (w, x, y, z), of unit length, and rotate body axes to world axes.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

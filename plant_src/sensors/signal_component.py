@@ -1,7 +1,5 @@
 """Base classes of sensors, estimators and faults: few real inputs and outputs."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 import struct

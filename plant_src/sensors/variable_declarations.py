@@ -1,7 +1,5 @@
 """Declarations of variables and checks of arguments that sensors share."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

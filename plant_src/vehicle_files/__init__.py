@@ -1,1 +1,1 @@
-"""Vehicle files: their equations and plausibility, and their import from URDF and meshes."""
+"""Vehicle files: their summary, and their import from URDF and meshes."""

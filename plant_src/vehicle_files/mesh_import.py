@@ -7,8 +7,6 @@ trimesh (extra "mesh") reads the files. Only the import needs it: the vehicle fi
 results. Coordinates are taken as they are: x forward, y left, z up.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple

@@ -4,8 +4,6 @@ Mass, inertia, dimensions, actuators, top speed and turning of a vessel, paramet
 mistakes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -14,14 +12,12 @@ import numpy as np
 from cosim.core.component import Variable
 from cosim.core.errors import Problem
 
-from ..catalogue import model_from_data
-from ..vehicles.model import Model
+from ..catalogue import Model, model_from_data
 from ..vehicles.multirotor.airframe import Airframe
 from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel
 from ..vehicles.vessel.actuators import Propeller
 from ..vehicles.vessel.boat import Boat
-from .plausibility import box_corners, vehicle_warnings
-from .vessel_plausibility import surge_damping
+from ..vehicles.vessel_plausibility import surge_damping
 
 #: smallest lever (m) of a propeller or rudder that turns the vessel
 _MIN_LEVER = 1e-6
@@ -110,7 +106,7 @@ def examine_vehicle(data: Mapping[str, Any], name: str) -> VehicleSummary:
     parameters = controller_parameters(model.airframe) if model.airframe else {}
     performance = dict(boat_properties(model.boat)) if model.boat else {}
     return VehicleSummary(
-        model.body.mass, _inertia(model), parameters, list(vehicle_warnings(model)), performance
+        model.body.mass, _inertia(model), parameters, list(model.warnings()), performance
     )
 
 
@@ -123,7 +119,7 @@ def describe_vehicle(
         InputError: As of `examine_vehicle`.
     """
     model = model_from_data(data, name)
-    corners = box_corners(model)
+    corners = model.box_corners
     properties = {
         "vehicle": model.name,
         "family": str(data["family"]),

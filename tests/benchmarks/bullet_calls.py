@@ -66,7 +66,9 @@ def record_calls(load: Callable[[], Any]) -> BulletCalls:
         for name, function in getmembers(pybullet, isbuiltin):
             patch.setattr(pybullet, name, _recording_wrapper(function, calls))
         prepared = load()
-        run = simulate(prepared.system, prepared.settings, [lambda *_: marks.append(len(calls))])
+        run = simulate(
+            prepared.system, prepared.plan.settings, [lambda *_: marks.append(len(calls))]
+        )
     if run.failure:
         raise run.failure
     return BulletCalls(calls, marks[0], marks[-1], run.macro_steps)

@@ -35,7 +35,7 @@ def step_cost(scenario: str | Path, executor: ExecutorKind, **changes: Any) -> f
     prepared = load(scenario)
     watch = Stopwatch()
     run = simulate(
-        prepared.system, replace(prepared.settings, executor=executor, **changes), [watch]
+        prepared.system, replace(prepared.plan.settings, executor=executor, **changes), [watch]
     )
     if run.failure:
         raise run.failure

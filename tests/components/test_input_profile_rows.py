@@ -45,6 +45,31 @@ def test_empty_rows_are_passed_over(tmp_path):
 COLOURS = (("red", 1), ("green", 2))
 
 
+def values_of_u(file, kind):
+    """Return what a profile gives an input of a type at 0, 1 and 2 s."""
+    variable = Variable("u", kind, items=COLOURS if kind == "Enumeration" else ())
+    table = read_input_table(file, {"u": variable}, "linear")
+    assert table.variables[0].type == kind
+    ports = build_layout({"table": table.variables}).ports["table"]
+    table.bind(Ports((), {}), ports)
+    table.enter_initialization_mode(0.0, 2.0)
+    found = []
+    for time in (0.0, 1.0, 2.0):
+        table.get_outputs()
+        found += ports.arrays[table.variables[0].dtype].tolist()
+        table.do_step(time, 1.0)
+    return found
+
+
+@pytest.mark.parametrize("mark", ["", "\ufeff"], ids=["", "marked"])
+@pytest.mark.parametrize("comma", [",", ", "], ids=["", "blank"])
+@pytest.mark.parametrize("line_end", ["\n", "\r\n", "\r"], ids=["lf", "crlf", "cr"])
+def test_files_of_every_system_are_read(tmp_path, mark, comma, line_end):
+    file = tmp_path / "in.csv"
+    file.write_bytes((mark + line_end.join(["time,u", "0,1", "2,5"]).replace(",", comma)).encode())
+    assert values_of_u(file, "Float64") == [1.0, 3.0, 5.0]
+
+
 @pytest.mark.parametrize(
     ("kind", "cells", "values"),
     [
@@ -60,18 +85,7 @@ COLOURS = (("red", 1), ("green", 2))
 def test_a_column_has_the_type_of_its_input(tmp_path, kind, cells, values):
     file = tmp_path / "in.csv"
     file.write_text(f"time,ignored,u\n0,x,{cells[0]}\n2,x,{cells[1]}\n")
-    table = read_input_table(
-        file, {"u": Variable("u", kind, items=COLOURS if kind == "Enumeration" else ())}, "linear"
-    )
-    ports = build_layout({"table": table.variables}).ports["table"]
-    table.bind(Ports((), {}), ports)
-    table.enter_initialization_mode(0.0, 2.0)
-    found = []
-    for time in (0.0, 1.0, 2.0):
-        table.get_outputs()
-        found += ports.arrays[table.variables[0].dtype].tolist()
-        table.do_step(time, 1.0)
-    assert (table.variables[0].type, found) == (kind, values)
+    assert values_of_u(file, kind) == values
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 equal names do not mix.
 """
 
+import os
+import py_compile
 from pathlib import Path
 
 import pytest
@@ -101,3 +103,18 @@ def test_a_shipped_package_gets_its_name_only_if_that_is_free(tmp_path, monkeypa
     part = python_import.import_shipped(f"{name}.part")
     assert part.origin == "shipped"
     assert (part.__name__ == f"{name}.part") is not is_taken
+
+
+@pytest.mark.parametrize("written", [0.4, 0.8], ids=["older", "newer"])
+def test_a_compiled_file_of_a_package_is_used_only_if_it_is_newer(tmp_path, written):
+    package = tmp_path / "package"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    file = package / "gain.py"
+    for value in (1, 2):
+        file.write_text(f"value = {value}")
+        os.utime(file, (0, 0.2 * value + 0.1))  # of one second, and of one size
+        if value == 1:
+            cached = Path(py_compile.compile(file, doraise=True))
+            os.utime(cached, (0, written))
+    assert load_object("gain.py:value", package) == (2 if written < 0.5 else 1)

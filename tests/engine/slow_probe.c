@@ -1,5 +1,6 @@
-/* The foreign FMI 2.0 probe with a doStep of BUSY_NS processor time, or waiting time with WAIT; aborts after FATAL_TIME (s).
-   i_out: largest number of instances that were in doStep at once; e_out: 1 if the step ran on another than the main thread. */
+/* The foreign FMI 2.0 probe with a doStep of BUSY_NS processor time, or waiting time with WAIT;
+   aborts after FATAL_TIME (s). i_out: largest number of instances that were in doStep at once;
+   e_out: 1 if the step ran on another than the main thread. */
 #define _GNU_SOURCE
 #include <stdatomic.h>
 #include <sys/syscall.h>

@@ -23,7 +23,7 @@ from cosim.export.fmu.compiler import find_compiler
 ENGINE = Path(native_executor.__file__).parent
 #: interface number of a build, and what differs in its source; the oldest builds have 0
 OTHER_SOURCES = {
-    0: ('{"INTERFACE", INTERFACE}, ', ""),
+    0: ('{"INTERFACE", INTERFACE},', ""),
     native_executor.INTERFACE + 1: ("{ INTERFACE = ", "{ INTERFACE = 1 + "),
     -1: ("{ INTERFACE = ", "{ INTERFACE = -1 - 0 * "),
 }

@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from cosim.core.component import Variable
-from plant_src.catalogue import VEHICLE_MODELS
-from plant_src.vehicles.model import Model
+from plant_src.catalogue import VEHICLE_MODELS, Model
 from plant_src.world import World
 from plant_src.world_settings import INITIAL_PREFIX, WAVE_PREFIX
 

@@ -142,6 +142,13 @@ def test_files_of_other_programs_are_read(tmp_path):
     assert foreign.columns["state"].tolist() == ["on", "off", "off"]
 
 
+@pytest.mark.parametrize("cell", ["2.5", "on"], ids=["numbers", "texts"])
+def test_blanks_after_commas_belong_to_no_name_or_text(tmp_path, cell):
+    foreign = read_csv(written(tmp_path, f'time, "x, y",  state\n0, 1, {cell}\n'))
+    assert list(foreign.columns) == ["x, y", "state"]
+    assert [str(foreign.columns[name][0]) for name in foreign.columns] == ["1", cell]
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -18,7 +18,7 @@ from cosim.scenario import load
 def test_times(time):
     prepared = load("free_flight", stop_time=time, step_size=Fraction(1, 100))
     prepared.free()
-    assert (prepared.settings.stop_time, prepared.settings.step_size) == (
+    assert (prepared.plan.settings.stop_time, prepared.plan.settings.step_size) == (
         Fraction(1, 10),
         Fraction(1, 100),
     )

@@ -143,6 +143,28 @@ def test_a_wrong_entry_point_names_its_package(replay, installed, kind, text):
     assert text in str(refusal.value)
 
 
+@pytest.mark.usefixtures("recordings")
+@pytest.mark.parametrize(
+    "module", ["import missing_library", "raise SystemExit(3)", "Broken = int", "1 +"]
+)
+def test_a_broken_package_keeps_no_other_scenario_from_running(
+    replay, installed, folder, module, caplog
+):
+    (installed / "damaged.py").write_text(module)
+    (installed / "damaged-2.0.dist-info").mkdir()
+    (installed / "damaged-2.0.dist-info/METADATA").write_text("Name: damaged\nVersion: 2.0\n")
+    entry = "[cosim.sources]\ndamaged = damaged:Broken\n"
+    (installed / "damaged-2.0.dist-info/entry_points.txt").write_text(entry)
+    assert cosim.run(replay)["wind.speed"].tolist() == [4.0, 4.0, 6.0, 6.0, 6.0]
+    (warning,) = caplog.messages
+    assert 'the kind of sources "damaged" of the package damaged' in warning
+    (line, *_) = folder.problems_of(change(replay, ofset=1))
+    assert '$.components.wind.ofset: unknown key; did you mean "offset"?' in line
+    with pytest.raises(cosim.InputError) as refusal:
+        cosim.run(folder.scenario({"a": {"damaged": "x"}}))
+    assert str(refusal.value).startswith('the kind of sources "damaged" of the package damaged')
+
+
 def test_commands_know_the_kind(replay, installed):
     def command(*words):
         return subprocess.run(

@@ -51,7 +51,8 @@ def model_description(version: int) -> str:
         f'modelName="Ball" {token}>\n'
         f"<ModelExchange {flags}{completes}/>\n"
         '<DefaultExperiment startTime="0" stopTime="2" stepSize="0.01" tolerance="1e-8"/>\n'
-        f"<ModelVariables>\n{chr(10).join(lines)}\n</ModelVariables>\n<ModelStructure>{_structure(version)}</ModelStructure>\n"
+        f"<ModelVariables>\n{chr(10).join(lines)}\n</ModelVariables>\n"
+        f"<ModelStructure>{_structure(version)}</ModelStructure>\n"
         "</fmiModelDescription>\n"
     )
 
@@ -119,7 +120,8 @@ def description_1(interface: str) -> str:
         'modelIdentifier="ball" guid="ball" numberOfContinuousStates="3" '
         'numberOfEventIndicators="1">\n'
         '<DefaultExperiment startTime="0" stopTime="2" tolerance="1e-8"/>\n'
-        f"<ModelVariables>\n{chr(10).join(_variables_1())}\n</ModelVariables>\n{implementation}</fmiModelDescription>\n"
+        f"<ModelVariables>\n{chr(10).join(_variables_1())}\n</ModelVariables>\n"
+        f"{implementation}</fmiModelDescription>\n"
     )
 
 

@@ -89,7 +89,15 @@ def trim(
         scenario, _split_names(free), _split_names(steady), _numbers(require), parameters=given
     )
     if output:
-        _write_scenario(output, scenario, {**given, **found.parameters})
+        from ...results.files import write_json
+        from ...scenario.file_paths import find_scenario
+        from ...scenario.nested_systems import extending_scenario
+
+        description = f"{find_scenario(scenario).stem}, started at its operating point"
+        output.parent.mkdir(parents=True, exist_ok=True)
+        values = {**given, **found.parameters}
+        started = extending_scenario(scenario, output.parent, output.stem, description, values)
+        write_json(started, output)
     if as_json:
         values = {key: getattr(found, key) for key in ("parameters", "residuals", "evaluations")}
         print_json({"found": found.is_found, **values})
@@ -107,16 +115,6 @@ def _numbers(texts: Texts) -> dict[str, float]:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise InputError(f"--require {name}={value}: expected a number")
     return values
-
-
-def _write_scenario(file: Path, scenario: str, settings: dict[str, Any]) -> None:
-    from ...results.files import write_json
-    from ...scenario.file_paths import find_scenario
-    from ...scenario.nested_systems import extending_scenario
-
-    description = f"{find_scenario(scenario).stem}, started at its operating point"
-    file.parent.mkdir(parents=True, exist_ok=True)
-    write_json(extending_scenario(scenario, file.parent, file.stem, description, settings), file)
 
 
 def _print_trim(found: Trim, output: Path | None) -> None:

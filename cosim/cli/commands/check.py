@@ -96,7 +96,7 @@ def _describe(prepared: PreparedRun, warnings: Sequence[Problem]) -> dict[str, A
     from ...scenario.plausibility import unconnected_inputs
     from ...scenario.stages import recommend
 
-    times = prepared.settings
+    times = prepared.plan.settings
     unconnected: dict[str, list[str]] = {}
     for end in unconnected_inputs(prepared):
         unconnected.setdefault(end.component, []).append(end.scalar)
@@ -117,7 +117,7 @@ def _print_verdict(prepared: PreparedRun, warnings: Sequence[Problem]) -> None:
     for problem in warnings:
         click.echo(f"WARNING {problem}", err=True)
     verdict = f"{count_noun(len(warnings), 'warning')}." if warnings else "No warnings."
-    times, grid = prepared.settings, prepared.plan.grid
+    times, grid = prepared.plan.settings, prepared.plan.grid
     rest = grid.end - grid.start - grid.whole_steps * grid.step
     last = f", the last one of {float(rest):.6g} s" if rest else ""
     click.echo(

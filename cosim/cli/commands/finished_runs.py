@@ -1,7 +1,5 @@
 """Commands that present finished runs: `cosim plot`, `report` and `replay`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

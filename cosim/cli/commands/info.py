@@ -109,7 +109,18 @@ def _describe(source: str) -> tuple[Mapping[str, str], Sequence[Variable]]:
         kind = MEMBERS[Path(source).suffix]
         raise InputError(f"{source}: expected the name of a {kind.lower()}, as in {source}:{kind}")
     if file.endswith(".py"):
-        return _describe_class(source)
+        from ...components.python_class import load_component
+
+        component = load_component(source, Path(), "component", {})
+        used = {
+            "variable step size": component.variable_step,
+            "state can be saved and restored": component.has_state,
+            "inputs can be linear within a step": component.interpolates_inputs,
+        }
+        return {
+            "class": source,
+            "capabilities": ", ".join(name for name, has in used.items() if has),
+        }, component.variables
     if source.endswith(".json"):
         from ...export.plant import describe_vehicle
 
@@ -121,21 +132,6 @@ def _describe(source: str) -> tuple[Mapping[str, str], Sequence[Variable]]:
     else:
         fmu = FmuFile(_find_fmu(source))
     return _properties(fmu), fmu.description.variables
-
-
-def _describe_class(reference: str) -> tuple[dict[str, str], Sequence[Variable]]:
-    from ...components.python_class import load_component
-
-    component = load_component(reference, Path(), "component", {})
-    used = {
-        "variable step size": component.variable_step,
-        "state can be saved and restored": component.has_state,
-        "inputs can be linear within a step": component.interpolates_inputs,
-    }
-    return {
-        "class": reference,
-        "capabilities": ", ".join(name for name, has in used.items() if has),
-    }, component.variables
 
 
 def _find_fmu(fmu: str) -> Path:

@@ -1,7 +1,5 @@
 """`cosim init`: a new project with a controller, a scenario, its reference, tests and CI."""
 
-from __future__ import annotations
-
 import json
 import shlex
 import shutil

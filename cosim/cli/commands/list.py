@@ -1,7 +1,5 @@
 """`cosim list` and `cosim schema`: what cosim ships, and the JSON Schemas of its files."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict
 from typing import Any

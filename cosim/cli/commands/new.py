@@ -1,7 +1,5 @@
 """`cosim new`: a controller with a scenario in which it runs, a scenario, or a vehicle."""
 
-from __future__ import annotations
-
 import json
 import keyword
 import re

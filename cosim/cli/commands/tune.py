@@ -18,7 +18,6 @@ from ..options import complete_study, flag_option, json_option, output_dir_optio
 if TYPE_CHECKING:
     from ...studies.execution.run_store import RunStore
     from ...studies.tune import Trial, Tuning
-    from ...studies.worst_case import WorstCase
 
 
 @click.command()
@@ -111,24 +110,22 @@ def _find_worst(
     if as_json:
         print_json({**describe_worst_case(search), "files": [str(each) for each in files]})
     else:
-        _print_worst(search, files)
+        shown = search.counterexamples or [search.worst]
+        rows = []
+        for each in shown:
+            values = [f"{value:.6g}" for value in each.parameters.values()]
+            rows.append([f"{each.severity:.3g}", *values])
+        print_table(["severity", *shown[0].parameters], rows)
+        for attempt, path in zip(shown, files, strict=False):
+            click.echo(f"{attempt.reason}\n  cosim run {path}")
+        broken = sum(not each.passed for each in search.attempts)
+        verdict = (
+            f"a check of {broken} failed"
+            if files
+            else f"all checks passed; closest: {shown[0].reason}"
+        )
+        click.echo(f"{count_noun(len(search.attempts), 'run')}: {verdict}")
     return 3 if files else 0
-
-
-def _print_worst(search: WorstCase, files: list[Path]) -> None:
-    shown = search.counterexamples or [search.worst]
-    rows = []
-    for each in shown:
-        values = [f"{value:.6g}" for value in each.parameters.values()]
-        rows.append([f"{each.severity:.3g}", *values])
-    print_table(["severity", *shown[0].parameters], rows)
-    for each, file in zip(shown, files, strict=False):
-        click.echo(f"{each.reason}\n  cosim run {file}")
-    broken = sum(not each.passed for each in search.attempts)
-    verdict = (
-        f"a check of {broken} failed" if files else f"all checks passed; closest: {shown[0].reason}"
-    )
-    click.echo(f"{count_noun(len(search.attempts), 'run')}: {verdict}")
 
 
 def _print_best(tuning: Tuning, best: Trial, folder: Path, failure: str | None) -> None:

@@ -1,7 +1,9 @@
-/* The logger of FMI 1.0 and 2.0: formats the message with its arguments and passes it to a function with fixed arguments.
+/* The logger of FMI 1.0 and 2.0: formats the message with its arguments and passes it to a function
+   with fixed arguments.
 
-   A message may contain directives for which the FMU passed no argument. Therefore the directives are formatted one by one: %n is
-   copied like any other text, and a pointer of %s is used only if its memory can be read. */
+   A message may contain directives for which the FMU passed no argument. Therefore the directives
+   are formatted one by one: %n is copied like any other text, and a pointer of %s is used only if
+   its memory can be read. */
 #define _DEFAULT_SOURCE
 #define Py_LIMITED_API 0x030b0000
 #define PY_SSIZE_T_CLEAN
@@ -37,7 +39,8 @@ static bool is_page_readable(const char *address) {
 /* Return the length of a text up to `limit`, or -1 if its memory cannot be read. */
 static long readable_length(const char *text, size_t limit) {
     for (size_t n = 0; n < limit; n++) {
-        if ((n == 0 || ((uintptr_t)(text + n) % PAGE) == 0) && !is_page_readable(text + n)) return -1;
+        if ((n == 0 || ((uintptr_t)(text + n) % PAGE) == 0) && !is_page_readable(text + n))
+            return -1;
         if (!text[n]) return (long)n;
     }
     return (long)limit;
@@ -55,19 +58,23 @@ static void append(Buffer *b, const char *text, size_t length) {
     b->length += length;
 }
 
-/* Directive: its text up to the conversion character, the length modifier, and the values of "*". */
+/* Directive: its text up to the conversion character, the length modifier, and the values of
+   "*". */
 typedef struct {
     char format[MAX_DIRECTIVE];
     char modifier; /* h, H (hh), l, L (ll), j, z, t, D (long double) or 0 */
     char conversion;
 } Directive;
 
-/* Read the directive after a "%", with the values of "*"; return the first character after it, or NULL if it is none. */
+/* Read the directive after a "%", with the values of "*"; return the first character after it, or
+   NULL if it is none. */
 static const char *read_directive(const char *p, Directive *d, va_list *arguments) {
     size_t n = 0;
     d->format[n++] = '%';
     for (; *p && strchr("-+ #0123456789.*", *p); p++) {
-        int written = *p == '*' ? snprintf(d->format + n, MAX_DIRECTIVE - n, "%d", va_arg(*arguments, int) % 1000) : 1;
+        int written = *p == '*' ? snprintf(d->format + n, MAX_DIRECTIVE - n, "%d",
+                                           va_arg(*arguments, int) % 1000)
+                                : 1;
         if (*p != '*') d->format[n] = *p;
         n += (size_t)written;
         if (n > MAX_DIRECTIVE - 8) return NULL;
@@ -86,7 +93,8 @@ static const char *read_directive(const char *p, Directive *d, va_list *argument
 
 #define PRINT(TYPE) (length = snprintf(piece, sizeof piece, d->format, va_arg(*arguments, TYPE)))
 
-/* Append the argument of a directive; false if the directive is unknown or its argument cannot be used. */
+/* Append the argument of a directive; false if the directive is unknown or its argument cannot be
+   used. */
 static bool append_argument(Buffer *b, const Directive *d, va_list *arguments) {
     char piece[1024];
     int length = -1;
@@ -94,7 +102,9 @@ static bool append_argument(Buffer *b, const Directive *d, va_list *arguments) {
         const char *text = va_arg(*arguments, const char *), *point = strchr(d->format, '.');
         int precision = MAX_LENGTH;
         if (point) sscanf(point + 1, "%d", &precision);
-        long size = d->modifier == 'l' ? -1 : readable_length(text, precision < 0 ? MAX_LENGTH : (size_t)precision);
+        long size = d->modifier == 'l'
+                        ? -1
+                        : readable_length(text, precision < 0 ? MAX_LENGTH : (size_t)precision);
         if (size < 0) return false;
         if (d->format[1] == 's' || size >= (long)sizeof piece) {
             append(b, text, (size_t)size);
@@ -132,17 +142,31 @@ static void format_message(Buffer *b, const char *message, va_list *arguments) {
         }
         append(b, begin, (size_t)(percent - begin));
         Directive d;
-        const char *end = count++ < MAX_ARGUMENTS ? read_directive(percent + 1, &d, arguments) : NULL;
+        const char *end =
+            count++ < MAX_ARGUMENTS ? read_directive(percent + 1, &d, arguments) : NULL;
         message = end ? end : percent + 1;
-        if (!end || !append_argument(b, &d, arguments)) append(b, percent, (size_t)(message - percent));
+        if (!end || !append_argument(b, &d, arguments))
+            append(b, percent, (size_t)(message - percent));
     }
 }
 
-static void log_message(void *environment, const char *name, int status, const char *category, const char *message, ...) {
+/* Call the receiver, which is Python code, without an exception that the FMU has not handled yet:
+   its own calls would fail. PythonFMU sends messages before it handles the exception of a slave. */
+static void receive(void *environment, const char *name, int status, const char *text) {
+    PyObject *type, *value, *traceback;
+    PyGILState_STATE state = PyGILState_Ensure();
+    PyErr_Fetch(&type, &value, &traceback);
+    receiver(environment, name, status, text);
+    PyErr_Restore(type, value, traceback);
+    PyGILState_Release(state);
+}
+
+static void log_message(void *environment, const char *name, int status, const char *category,
+                        const char *message, ...) {
     (void)category;
     if (!receiver) return;
     if (!message || !strchr(message, '%')) {
-        receiver(environment, name, status, message);
+        receive(environment, name, status, message);
         return;
     }
     Buffer buffer = {.length = 0};
@@ -151,12 +175,15 @@ static void log_message(void *environment, const char *name, int status, const c
     format_message(&buffer, message, &arguments);
     va_end(arguments);
     buffer.text[buffer.length] = 0;
-    receiver(environment, name, status, buffer.text);
+    receive(environment, name, status, buffer.text);
 }
 
 static struct PyModuleDef definition = {
-    PyModuleDef_HEAD_INIT, "_logger", "Logger of FMI 1.0 and 2.0, which has a variable number of arguments.", -1, NULL,
-    NULL, NULL, NULL, NULL};
+    .m_base = PyModuleDef_HEAD_INIT,
+    .m_name = "_logger",
+    .m_doc = "Logger of FMI 1.0 and 2.0, which has a variable number of arguments.",
+    .m_size = -1,
+};
 
 static int add_address(PyObject *module, const char *name, uintptr_t address) {
     PyObject *number = PyLong_FromVoidPtr((void *)address);
@@ -168,7 +195,8 @@ static int add_address(PyObject *module, const char *name, uintptr_t address) {
 PyMODINIT_FUNC PyInit__logger(void) {
     PyObject *module = PyModule_Create(&definition);
     if (!module) return NULL;
-    if (add_address(module, "LOGGER", (uintptr_t)log_message) < 0 || add_address(module, "RECEIVER", (uintptr_t)&receiver) < 0) {
+    if (add_address(module, "LOGGER", (uintptr_t)log_message) < 0 ||
+        add_address(module, "RECEIVER", (uintptr_t)&receiver) < 0) {
         Py_DECREF(module);
         return NULL;
     }

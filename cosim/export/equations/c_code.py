@@ -7,8 +7,6 @@ function only. The code is readable, compiles without warnings and depends only 
 mathematical library.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -114,14 +112,13 @@ def callee_definitions(
             for required in callee.required_functions if callee else ():
                 definitions |= callee_definitions([required], callees)
                 definitions |= {required.name(): function_definition("static", required)}
-            definitions[called.name()] = (
-                _callee_definition(callee) if callee else function_definition("static", called)
-            )
+            if callee:
+                signature = _SIGNATURE.format(callee.function.name())
+                definition = f"{callee.attributes}static {signature}\n{callee.body}"
+            else:
+                definition = function_definition("static", called)
+            definitions[called.name()] = definition
     return definitions
-
-
-def _callee_definition(callee: Callee) -> str:
-    return f"{callee.attributes}static {_SIGNATURE.format(callee.function.name())}\n{callee.body}"
 
 
 def function_definition(linkage: str, function: ca.Function) -> str:

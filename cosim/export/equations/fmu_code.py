@@ -3,8 +3,6 @@
 Generated functions and the functions of the block interface.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 

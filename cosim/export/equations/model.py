@@ -13,8 +13,6 @@ where `in[i]` and `out[i]` point to the elements of argument i and result i in c
 Arguments and results must not overlap in memory.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path

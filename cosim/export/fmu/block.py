@@ -46,8 +46,6 @@ fmi3Error. Functions that other programs load from the binary are marked `MODEL_
 `export.h` of the shell).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

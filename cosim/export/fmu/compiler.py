@@ -1,7 +1,5 @@
 """Discovery and invocation of the C compiler."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import shutil

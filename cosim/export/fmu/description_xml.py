@@ -1,7 +1,5 @@
 """modelDescription.xml and buildDescription.xml of an FMU: contents and validation."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
@@ -278,14 +276,13 @@ def _type_attributes(variable: BlockVariable, declared: dict[Any, str]) -> dict[
         "unit": variable.unit or None if variable.type == "Float64" else None,
         "min": None if minimum is None else number(minimum),
         "max": None if maximum is None else number(maximum),
-        "start": " ".join(_format_value(_cast(variable, value)) for value in start_values(variable))
+        "start": " ".join(
+            _format_value({"Float64": float, "Boolean": bool}.get(variable.type, int)(value))
+            for value in start_values(variable)
+        )
         if has_start
         else None,
     }
-
-
-def _cast(variable: BlockVariable, value: Any) -> Any:
-    return {"Float64": float, "Boolean": bool}.get(variable.type, int)(value)
 
 
 def _output_indices(table: Sequence[TableRow]) -> list[int]:

@@ -3,8 +3,6 @@
 Sources, model description, binary and resources in one archive.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from hashlib import sha256
 from importlib.util import find_spec
@@ -62,7 +60,12 @@ def write_fmu(block: Block, fmi_version: int, target: Path) -> Path:
 
 def _description_and_sources(block: Block, fmi_version: int) -> dict[str, bytes]:
     """Return model description and sources; their instantiation token is a hash of both."""
-    sources = _collect_sources(block, fmi_version)
+    sources = {name: text.encode() for name, text in block.files.items()}
+    sources |= {name: path.read_bytes() for name, path in block.archives.items()}
+    shell = _SHELL_FILES[fmi_version] + (_EXCHANGE_FILES[fmi_version] if block.exchange else ())
+    sources |= {name: (SHELL_FOLDER / name).read_bytes() for name in shell}
+    sources |= fmi_headers(fmi_version)
+    sources["variables.h"] = c_variable_table(block, fmi_version).encode()
     c_files = _c_files(sources)
     token = content_token(
         [
@@ -77,17 +80,6 @@ def _description_and_sources(block: Block, fmi_version: int) -> dict[str, bytes]
     return {"modelDescription.xml": description} | {
         f"sources/{name}": text for name, text in sources.items()
     }
-
-
-def _collect_sources(block: Block, fmi_version: int) -> dict[str, bytes]:
-    """Return all files that are needed to compile the FMU, without the instantiation token."""
-    sources = {name: text.encode() for name, text in block.files.items()}
-    sources |= {name: path.read_bytes() for name, path in block.archives.items()}
-    shell = _SHELL_FILES[fmi_version] + (_EXCHANGE_FILES[fmi_version] if block.exchange else ())
-    sources |= {name: (SHELL_FOLDER / name).read_bytes() for name in shell}
-    sources |= fmi_headers(fmi_version)
-    sources["variables.h"] = c_variable_table(block, fmi_version).encode()
-    return sources
 
 
 def fmi_headers(fmi_version: int) -> dict[str, bytes]:

@@ -1,7 +1,5 @@
 """Variables of a block in an FMU: value references, memory offsets and validation of the block."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections import Counter

@@ -1,7 +1,5 @@
 """Export of sources that implement FMI themselves, and binaries for FMUs that lack one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from ...components.fmi import FmuFile

@@ -3,8 +3,6 @@
 A folder with C files and a modelDescription.xml.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -32,7 +30,16 @@ def write_c_fmu(description: Path, target: Path) -> list[Path]:
     source_files = sorted(
         path for path in description.parent.iterdir() if path.suffix in (".c", ".h")
     )
-    _check_files(description, c_files, {path.name for path in source_files})
+    present = {path.name for path in source_files}
+    if not c_files:
+        raise InputError(Problem("names no file in <CoSimulation><SourceFiles>", str(description)))
+    problems = [
+        f'<File name="{name}"> does not exist{did_you_mean(name, present)}'
+        for name in c_files
+        if name not in present
+    ]
+    if problems:
+        raise InputError([Problem(problem, str(description)) for problem in problems])
     sources = fmi_headers(2) | {path.name: path.read_bytes() for path in source_files}
     files = {DESCRIPTION_FILE: description.read_bytes()} | {
         f"sources/{name}": text for name, text in sources.items()
@@ -58,15 +65,3 @@ def _read_co_simulation_element(description: Path) -> tuple[str, list[str]]:
     return interface.get("modelIdentifier", ""), [
         file.get("name", "") for file in interface.iterfind("SourceFiles/File")
     ]
-
-
-def _check_files(description: Path, c_files: list[str], present: set[str]) -> None:
-    if not c_files:
-        raise InputError(Problem("names no file in <CoSimulation><SourceFiles>", str(description)))
-    problems = [
-        f'<File name="{name}"> does not exist{did_you_mean(name, present)}'
-        for name in c_files
-        if name not in present
-    ]
-    if problems:
-        raise InputError([Problem(problem, str(description)) for problem in problems])

@@ -1,5 +1,6 @@
-/* Types and functions of FMI 1.0 (FMI 1.0 for Model Exchange, sections 2.1 to 2.7; for Co-Simulation, sections 3.1 to 3.9), for
-   the sources of FMUs, which include them as fmiFunctions.h or fmiModelFunctions.h. Sources define MODEL_IDENTIFIER. */
+/* Types and functions of FMI 1.0 (FMI 1.0 for Model Exchange, sections 2.1 to 2.7; for
+   Co-Simulation, sections 3.1 to 3.9), for the sources of FMUs, which include them as
+   fmiFunctions.h or fmiModelFunctions.h. Sources define MODEL_IDENTIFIER. */
 #ifndef COSIM_FMI1_H
 #define COSIM_FMI1_H
 #include <stddef.h>
@@ -31,7 +32,8 @@ typedef struct {
     fmiStepFinished stepFinished;
 } fmiCallbackFunctions;
 typedef struct {
-    fmiBoolean iterationConverged, stateValueReferencesChanged, stateValuesChanged, terminateSimulation, upcomingTimeEvent;
+    fmiBoolean iterationConverged, stateValueReferencesChanged, stateValuesChanged,
+        terminateSimulation, upcomingTimeEvent;
     fmiReal nextEventTime;
 } fmiEventInfo;
 

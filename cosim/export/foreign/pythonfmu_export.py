@@ -9,8 +9,6 @@ the modules that it imports become members of a package. The name of the package
 all contents, so that FMUs with modules of the same name do not conflict.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -76,10 +74,22 @@ def write_python_fmu(
     Raises:
         InputError: The class cannot be exported, or its model description is invalid.
     """
+    from ...components.python_fmu import checked_units
+
     contents, files = _read_files(source, include)
     members, units = _build_with_pythonfmu(source, contents, class_name)
     root = ElementTree.fromstring(members[DESCRIPTION_FILE])  # noqa: S314 - just written by PythonFMU
-    _set_units(root, units, source)
+    elements = {variable.get("name", ""): variable[0] for variable in root.iter("ScalarVariable")}
+    try:
+        checked = checked_units(
+            units, {name: _TYPES[element.tag] for name, element in elements.items()}
+        )
+    except InputError as error:
+        raise InputError(
+            [replace(problem, where=str(source)) for problem in error.problems]
+        ) from None
+    for name, unit in checked.items():
+        elements[name].set("unit", unit)
     _complete_description(root)
     root.set(
         "guid",
@@ -189,23 +199,6 @@ def _build_with_pythonfmu(
         with ZipFile(built[0]) as archive:
             units = json.loads((Path(target) / "units.json").read_text())
             return {name: archive.read(name) for name in archive.namelist()}, units
-
-
-def _set_units(root: Element, units: Any, source: Path) -> None:
-    """Set the unit of each variable that the class attribute `units` names."""
-    from ...components.python_fmu import checked_units
-
-    elements = {variable.get("name", ""): variable[0] for variable in root.iter("ScalarVariable")}
-    try:
-        checked = checked_units(
-            units, {name: _TYPES[element.tag] for name, element in elements.items()}
-        )
-    except InputError as error:
-        raise InputError(
-            [replace(problem, where=str(source)) for problem in error.problems]
-        ) from None
-    for name, unit in checked.items():
-        elements[name].set("unit", unit)
 
 
 def _complete_description(root: Element) -> None:

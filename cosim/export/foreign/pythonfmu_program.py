@@ -7,8 +7,6 @@ the source in it, the folder for the FMU and for `units.json`, the attribute `un
 and the name of the class if it is not the only one.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from importlib import import_module

@@ -3,8 +3,6 @@
 They are compiled when they are used, into the user's cache (see `add_binary`).
 """
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -5,8 +5,6 @@ A copy of the FMU in the user's cache gets a library for Linux, which forwards a
 The importer treats this copy like any other FMU.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

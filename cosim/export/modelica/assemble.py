@@ -5,10 +5,8 @@ as many equations `time = time`, or variables, as are missing. The matching of t
 which variables no equation determines, or which equations contradict others.
 """
 
-from __future__ import annotations
-
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from math import prod
@@ -63,7 +61,11 @@ def load_block(
 
 
 def _block(analysed: AnalysedModel, sources: ModelicaSources) -> Block:
-    folder = _source_root(sources.used)
+    # the folder that contains all files of the model
+    folder = min(
+        (file.parent.parent if file.name == "package.mo" else file.parent for file in sources.used),
+        key=lambda f: len(f.parts),
+    )
     names = {str(file.relative_to(folder)): file for file in sources.used}
     return Block(
         identifier=re.sub(r"\W", "_", analysed.model.name.rpartition(".")[2]),
@@ -214,14 +216,6 @@ def _check_types(model: Model) -> None:
                 f"{variable.name}: variables of type {variable.type} are not supported",
                 variable.where,
             )
-
-
-def _source_root(files: Sequence[Path]) -> Path:
-    """Return the folder that contains all files of the model."""
-    return min(
-        (file.parent.parent if file.name == "package.mo" else file.parent for file in files),
-        key=lambda f: len(f.parts),
-    )
 
 
 _BALANCE = re.compile(r"unbalanced model: \d+ equations, \d+ unknowns \(balance = (-?\d+)\)")

@@ -1,7 +1,5 @@
 """FMI variables of a Modelica model: causality, variability, start value and unit."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Sequence
 from dataclasses import replace

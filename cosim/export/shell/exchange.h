@@ -23,13 +23,17 @@ static bool set_time(Instance *instance, const char *function, double time)
 
 static bool has_size(Instance *instance, const char *function, size_t found, size_t expected)
 {
-    return found == expected || refuse(instance, function, "found %zu values, expected %zu", found, expected);
+    return found == expected ||
+           refuse(instance, function, "found %zu values, expected %zu", found, expected);
 }
 
-static bool set_continuous_states(Instance *instance, const char *function, const double *values, size_t count)
+static bool set_continuous_states(Instance *instance, const char *function, const double *values,
+                                  size_t count)
 {
     double *states[ADDRESSES], *rates[ADDRESSES];
-    if (!expect(instance, function, CONTINUOUS) || !has_size(instance, function, count, MODEL_STATES)) return false;
+    if (!expect(instance, function, CONTINUOUS) ||
+        !has_size(instance, function, count, MODEL_STATES))
+        return false;
     model_states(&instance->state.model, states, rates);
     for (size_t k = 0; k < MODEL_STATES; k++) *states[k] = values[k];
     instance->state.stale = true;
@@ -37,10 +41,13 @@ static bool set_continuous_states(Instance *instance, const char *function, cons
 }
 
 /* Copies the states or their derivatives. */
-static bool get_continuous(Instance *instance, const char *function, bool derivatives, double *values, size_t count)
+static bool get_continuous(Instance *instance, const char *function, bool derivatives,
+                           double *values, size_t count)
 {
     double *states[ADDRESSES], *rates[ADDRESSES];
-    if (!expect(instance, function, INITIALIZING | EVENT | CONTINUOUS | TERMINATED) || !refresh(instance, function)) return false;
+    if (!expect(instance, function, INITIALIZING | EVENT | CONTINUOUS | TERMINATED) ||
+        !refresh(instance, function))
+        return false;
     if (!has_size(instance, function, count, MODEL_STATES)) return false;
     model_states(&instance->state.model, states, rates);
     for (size_t k = 0; k < MODEL_STATES; k++) values[k] = derivatives ? *rates[k] : *states[k];
@@ -49,7 +56,9 @@ static bool get_continuous(Instance *instance, const char *function, bool deriva
 
 static bool get_indicators(Instance *instance, const char *function, double *values, size_t count)
 {
-    if (!expect(instance, function, INITIALIZING | EVENT | CONTINUOUS | TERMINATED) || !refresh(instance, function)) return false;
+    if (!expect(instance, function, INITIALIZING | EVENT | CONTINUOUS | TERMINATED) ||
+        !refresh(instance, function))
+        return false;
     if (!has_size(instance, function, count, MODEL_INDICATORS)) return false;
 #if MODEL_INDICATORS > 0
     memcpy(values, instance->state.model.indicator, sizeof instance->state.model.indicator);
@@ -57,7 +66,8 @@ static bool get_indicators(Instance *instance, const char *function, double *val
     return true;
 }
 
-/* Executes an event with its iteration. `changed`: the event has set states; `next`: time of the next tick, or infinite. */
+/* Executes an event with its iteration. `changed`: the event has set states; `next`: time of the
+   next tick, or infinite. */
 static bool update_discrete(Instance *instance, const char *function, bool *changed, double *next)
 {
     double *states[ADDRESSES], *rates[ADDRESSES], before[ADDRESSES];
@@ -65,7 +75,8 @@ static bool update_discrete(Instance *instance, const char *function, bool *chan
     if (!expect(instance, function, EVENT)) return false;
     model_states(&state->model, states, rates);
     for (size_t k = 0; k < MODEL_STATES; k++) before[k] = *states[k];
-    if (!succeeded(instance, function, model_update(&state->model, state->time, next))) return false;
+    if (!succeeded(instance, function, model_update(&state->model, state->time, next)))
+        return false;
     report_warnings(instance);
     *changed = false;
     for (size_t k = 0; k < MODEL_STATES; k++) *changed = *changed || *states[k] != before[k];

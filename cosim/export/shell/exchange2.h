@@ -25,7 +25,8 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info)
     return status(ok);
 }
 
-fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_rollback, fmi2Boolean *enter_event_mode,
+fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_rollback,
+                                       fmi2Boolean *enter_event_mode,
                                        fmi2Boolean *terminate_requested)
 {
     *enter_event_mode = *terminate_requested = fmi2False;

@@ -5,7 +5,8 @@ typedef fmi2CallbackLogger Logger;
 #define ARRAYS 0
 #include "common.h"
 
-/* FMI 2.0 messages are format strings with "%" directives and "#" references; both characters are escaped by doubling. */
+/* FMI 2.0 messages are format strings with "%" directives and "#" references; both characters are
+   escaped by doubling. */
 static void report(const Instance *instance, bool error, const char *message)
 {
     char escaped[1024];
@@ -15,8 +16,8 @@ static void report(const Instance *instance, bool error, const char *message)
         *end++ = *c;
     }
     *end = '\0';
-    instance->logger(instance->environment, instance->name, error ? fmi2Error : fmi2Warning, error ? "logStatusError" : "logStatusWarning",
-                     escaped);
+    instance->logger(instance->environment, instance->name, error ? fmi2Error : fmi2Warning,
+                     error ? "logStatusError" : "logStatusWarning", escaped);
 }
 
 static fmi2Status status(bool ok)
@@ -24,7 +25,7 @@ static fmi2Status status(bool ok)
     return ok ? fmi2OK : fmi2Error;
 }
 
-/* ---- inquiry and life cycle ------------------------------------------------------------------------------------------ */
+/* ---- inquiry and life cycle ------------------------------------------------------------------ */
 
 const char *fmi2GetTypesPlatform(void)
 {
@@ -37,22 +38,27 @@ const char *fmi2GetVersion(void)
 }
 
 /* Errors are always logged; there are no other messages. */
-fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t count, const fmi2String categories[])
+fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t count,
+                               const fmi2String categories[])
 {
     return fmi2OK;
 }
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
-                              const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging_on)
+                              const fmi2CallbackFunctions *functions, fmi2Boolean visible,
+                              fmi2Boolean logging_on)
 {
     if (functions == NULL || functions->logger == NULL) return NULL;
 #ifndef MODEL_EXCHANGE
     if (type != fmi2CoSimulation) {
-        Instance nobody = {.logger = functions->logger, .environment = functions->componentEnvironment, .name = ""};
+        Instance nobody = {.logger = functions->logger,
+                           .environment = functions->componentEnvironment,
+                           .name = ""};
         return refuse(&nobody, "fmi2Instantiate", "only Co-Simulation is offered"), NULL;
     }
 #endif
-    Instance *instance = create("fmi2Instantiate", name, guid, functions->logger, functions->componentEnvironment);
+    Instance *instance =
+        create("fmi2Instantiate", name, guid, functions->logger, functions->componentEnvironment);
     if (instance != NULL) instance->exchange = type == fmi2ModelExchange;
     return instance;
 }
@@ -62,8 +68,8 @@ void fmi2FreeInstance(fmi2Component c)
     destroy(c);
 }
 
-fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance, fmi2Real start,
-                               fmi2Boolean has_stop, fmi2Real stop)
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance,
+                               fmi2Real start, fmi2Boolean has_stop, fmi2Real stop)
 {
     return status(set_times(c, "fmi2SetupExperiment", start, has_stop, stop));
 }
@@ -95,34 +101,36 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step_size, fmi2Bo
     return ok && requests_termination(c) ? fmi2Discard : status(ok);
 }
 
-/* ---- access to variables --------------------------------------------------------------------------------------------- */
+/* ---- access to variables --------------------------------------------------------------------- */
 
-#define ACCESSORS(Type, TYPE, Inside)                                                                                       \
-    DEFINE_ACCESS(Type, TYPE, fmi2##Type, Inside)                                                                           \
-    fmi2Status fmi2Get##Type(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2##Type values[])                 \
-    {                                                                                                                       \
-        return status(read_##Type(c, "fmi2Get" #Type, vr, n, values, n));                                                   \
-    }                                                                                                                       \
-    fmi2Status fmi2Set##Type(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2##Type values[])           \
-    {                                                                                                                       \
-        return status(write_##Type(c, "fmi2Set" #Type, vr, n, values, n));                                                  \
+#define ACCESSORS(Type, TYPE, Inside) \
+    DEFINE_ACCESS(Type, TYPE, fmi2##Type, Inside) \
+    fmi2Status fmi2Get##Type(fmi2Component c, const fmi2ValueReference vr[], size_t n, \
+                             fmi2##Type values[]) { \
+        return status(read_##Type(c, "fmi2Get" #Type, vr, n, values, n)); \
+    } \
+    fmi2Status fmi2Set##Type(fmi2Component c, const fmi2ValueReference vr[], size_t n, \
+                             const fmi2##Type values[]) { \
+        return status(write_##Type(c, "fmi2Set" #Type, vr, n, values, n)); \
     }
 
 ACCESSORS(Real, FLOAT64, double)
 ACCESSORS(Integer, INT32, int32_t) /* enumerations too */
 ACCESSORS(Boolean, BOOLEAN, bool)
 
-fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String values[])
+fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                         fmi2String values[])
 {
     return status(n == 0 || refuse(c, "fmi2GetString", "there are no strings"));
 }
 
-fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2String values[])
+fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                         const fmi2String values[])
 {
     return status(n == 0 || refuse(c, "fmi2SetString", "there are no strings"));
 }
 
-/* ---- the FMU state --------------------------------------------------------------------------------------------------- */
+/* ---- the FMU state --------------------------------------------------------------------------- */
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *saved)
 {
@@ -151,12 +159,13 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate saved, fmi2Byte b
     return status(serialize(c, "fmi2SerializeFMUstate", saved, bytes, size));
 }
 
-fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *saved)
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
+                                   fmi2FMUstate *saved)
 {
     return status(deserialize(c, "fmi2DeSerializeFMUstate", bytes, size, saved));
 }
 
-/* ---- the status of a step: steps are never pending ------------------------------------------------------------------- */
+/* ---- the status of a step: steps are never pending ------------------------------------------- */
 
 fmi2Status fmi2CancelStep(fmi2Component c)
 {
@@ -192,23 +201,24 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2S
     return fmi2Discard;
 }
 
-/* ---- not offered ----------------------------------------------------------------------------------------------------- */
+/* ---- not offered ----------------------------------------------------------------------------- */
 
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknowns[], size_t unknown_count,
-                                        const fmi2ValueReference knowns[], size_t known_count, const fmi2Real seed[],
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknowns[],
+                                        size_t unknown_count, const fmi2ValueReference knowns[],
+                                        size_t known_count, const fmi2Real seed[],
                                         fmi2Real sensitivity[])
 {
     return status(refuse(c, "fmi2GetDirectionalDerivative", "not offered"));
 }
 
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
-                                       const fmi2Real values[])
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                                       const fmi2Integer order[], const fmi2Real values[])
 {
     return status(refuse(c, "fmi2SetRealInputDerivatives", "not offered"));
 }
 
-fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
-                                        fmi2Real values[])
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                                        const fmi2Integer order[], fmi2Real values[])
 {
     return status(refuse(c, "fmi2GetRealOutputDerivatives", "not offered"));
 }

@@ -24,8 +24,6 @@ return wrong outputs. `bubblewrap_command` (strict mode) hides all other files a
 whole command.
 """
 
-from __future__ import annotations
-
 import os
 import resource
 import socket

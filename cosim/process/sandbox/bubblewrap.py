@@ -1,7 +1,5 @@
 """Strict sandbox: bubblewrap runs a command with separate process ids, users, network and files."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """Environment of a sandboxed process: its variables, and the files that Python has to read."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import site

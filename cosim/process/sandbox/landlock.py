@@ -4,8 +4,6 @@ The three system calls are made by number, which is the same on every architectu
 are from linux/landlock.h.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import stat

@@ -5,8 +5,6 @@ system call. Constants are from linux/filter.h, linux/seccomp.h and linux/audit.
 from the tables of both architectures.
 """
 
-from __future__ import annotations
-
 import ctypes
 import errno
 import os

@@ -3,8 +3,6 @@
 Its source, its interface, and the check of the interface against a role.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping

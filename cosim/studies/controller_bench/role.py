@@ -29,8 +29,6 @@ without an index stands for an array. A parameter with a prefix may also be decl
 system, so that a part of it can be replaced.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal

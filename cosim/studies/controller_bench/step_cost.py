@@ -3,8 +3,6 @@
 It is measured in turns, so that other load of the machine affects all controllers equally.
 """
 
-from __future__ import annotations
-
 import logging
 import math
 import time

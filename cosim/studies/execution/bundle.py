@@ -1,7 +1,5 @@
 """Files that the runs of a scenario need, by content hash, so that another machine can run them."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping

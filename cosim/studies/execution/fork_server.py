@@ -8,8 +8,6 @@ starts a thread. For every file descriptor that it receives, it forks a worker p
 handles one job at a time, each in a separate child process.
 """
 
-from __future__ import annotations
-
 import gc
 import json
 import os

@@ -1,7 +1,5 @@
 """One run of a study in a separate, supervised child process."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """Success maps: success rates over two factors, in panels by up to two more."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence

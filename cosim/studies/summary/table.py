@@ -3,8 +3,6 @@
 One row per finished run in the order of the design, independent of how and where they were run.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 from collections.abc import Callable, Iterable, Sequence

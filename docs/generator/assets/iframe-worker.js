@@ -1,4 +1,5 @@
-// Worker in a hidden frame: browsers start no workers in pages that are opened as files, and the search needs one.
+// Worker in a hidden frame: browsers start no workers in pages that are opened as files, and the
+// search needs one.
 "use strict";
 if (location.protocol === "file:") {
   window.Worker = window.IFrameWorker = class extends EventTarget {

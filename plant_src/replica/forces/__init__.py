@@ -4,8 +4,6 @@ Each module of the folder becomes an FMU; this one has what they share. The mode
 tunable parameters. They are stepped before the plant, with the delayed signals of the bus.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import casadi as ca

@@ -63,8 +63,7 @@ from ..common.rigid_body import (
     with_world_outputs,
 )
 from ..common.water_surface import SURFACE_SUM
-from .airframe import MAX_ROTORS, Airframe, Rotor, RotorEffects
-from .interface import states, variables
+from .airframe import MAX_ROTORS, Airframe, Rotor, RotorEffects, states, variables
 from .loads import (
     RotorFunctions,
     add_water_loads,
@@ -94,7 +93,7 @@ class SpinningRotors(NamedTuple):
 
 @dataclass(frozen=True)
 class MultirotorEquations:
-    """Equations of an airframe; the vectors hold the variables of `interface.variables` in order.
+    """Equations of an airframe; the vectors hold the variables of `airframe.variables` in order.
 
     `inputs` and `constants` are vectors in the public methods and named values in the private ones.
 

@@ -47,7 +47,7 @@ from cosim.export.equations.c_code import Callee, sum_over_rows
 from ..common import kinematics
 from ..common.elementary_functions import clamp
 from ..common.named_values import NamedValues, vector_rows
-from .interface import ROTOR_TABLE_COLUMNS, table_rows
+from .airframe import ROTOR_TABLE_COLUMNS, table_rows
 
 #: largest ratio of the air speed in the plane of a rotor to the speed of its tips for which the
 #: translational lift grows

@@ -33,8 +33,7 @@ from ..common.named_values import (
 from ..common.rigid_body import with_world_outputs
 from ..vessel import planar_maps, propulsion
 from ..vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS, Propeller
-from .interface import states, variables
-from .planar_vessel import PlanarVessel
+from .planar_vessel import PlanarVessel, states, variables
 
 _BODY_STATES = 6
 _FAR_BELOW = 1e3  # m; propellers of planar vessels are always immersed

@@ -1,4 +1,4 @@
-"""Data of a vessel that moves in the horizontal plane (surge, sway and yaw), and their reader."""
+"""Vessels in the horizontal plane (surge, sway, yaw): reader of their data, and variables."""
 
 from __future__ import annotations
 
@@ -8,11 +8,24 @@ from typing import Any
 
 import numpy as np
 
+from cosim.core.component import Variable
 from cosim.core.errors import Problem
 
+from ..common.interface import (
+    CURRENT_INPUTS,
+    EXTERNAL_LOADS,
+    PLANAR_STATES,
+    VESSEL_OUTPUTS,
+    WIND_INPUTS,
+    element_states,
+    initial_variables,
+    matrix_parameter,
+    parameter,
+)
 from ..common.shapes import Body, Boxes
 from ..vessel import boat as boat_data
-from ..vessel.boat import Boat, BoatReader
+from ..vessel.actuators import actuator_inputs, actuator_parameters
+from ..vessel.boat import Boat, BoatReader, boat_parameters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,3 +108,53 @@ class PlanarVesselReader(BoatReader[PlanarVessel]):
             )
         matrix = self.read_nu_matrix(data, key, zero)
         return tuple(np.where(np.arange(3) == k, matrix, 0.0) for k in range(3))
+
+
+_INITIAL_PARAMETERS = initial_variables("xy", "uv", "r")
+
+
+def variables(vessel: PlanarVessel, slots: tuple[int, int] | None = None) -> tuple[Variable, ...]:
+    """Return parameters, inputs and outputs, in the order of the equations.
+
+    Parameters other than `initial.*` start at the values of the vessel.
+
+    Args:
+        vessel: Data of the vessel.
+        slots: Numbers of elements of the arrays of propellers and rudders. None means the numbers
+            of the vessel.
+    """
+    slots = slots or vessel.slots
+    return (
+        *_INITIAL_PARAMETERS,
+        parameter("mass", "kg", vessel.mass, "total mass", 0.0),
+        parameter(
+            "yaw_inertia",
+            "kg.m2",
+            vessel.yaw_inertia,
+            "moment of inertia about the vertical axis through the centre of mass",
+            0.0,
+        ),
+        *boat_parameters(vessel, "u, v, r"),
+        *_damping_parameters(vessel),
+        parameter("height", "m", vessel.height, "height of O above the still water"),
+        *actuator_parameters(vessel.propellers, vessel.rudders, slots),
+        *EXTERNAL_LOADS,
+        *actuator_inputs(vessel.propellers, vessel.rudders, slots),
+        *WIND_INPUTS,
+        *CURRENT_INPUTS,
+        *VESSEL_OUTPUTS,
+    )
+
+
+def _damping_parameters(vessel: PlanarVessel) -> Iterator[Variable]:
+    dampings = zip("uvr", vessel.quadratic_damping, vessel.cubic_damping, strict=True)
+    for letter, matrix, value in dampings:
+        text = f"load over |{letter}| times velocity, for u, v, r"
+        yield matrix_parameter(f"quadratic_damping.{letter}", text, matrix)
+        text = f"load over {letter} cubed, SI units"
+        yield parameter(f"cubic_damping.{letter}", "1", value, text, 0.0)
+
+
+def states(propeller_slots: int) -> tuple[str, ...]:
+    """Return the names of the states: those of a planar body, then the propeller speeds."""
+    return (*PLANAR_STATES, *element_states("propeller_speed", propeller_slots))

@@ -65,8 +65,7 @@ from ..common.rigid_body import (
     symmetric_matrix,
     with_world_outputs,
 )
-from .craft import MAX_THRUSTERS, Craft, Thruster
-from .interface import OCTANTS, states, variables
+from .craft import MAX_THRUSTERS, OCTANTS, Craft, Thruster, states, variables
 
 _SMALLEST_EXTENT = 1e-3  # m, replaces the vertical extent of a box without size
 
@@ -132,7 +131,7 @@ def solve_symmetric(matrix: ca.SX, right: ca.SX) -> ca.SX:
 class SubmergedEquations:
     """Equations of a submerged vehicle.
 
-    The vectors hold the variables of `interface.variables` in order.
+    The vectors hold the variables of `craft.variables` in order.
 
     Attributes:
         craft: Craft with the start values.

@@ -30,8 +30,7 @@ from ..vessel.hull import (
 )
 from ..vessel.strips import GRAVITY, Strips, TwinHull, equivalent_strips, immersion
 from ..vessel.vessel_equations import BulletBody, VesselModel, floating_block, wave_table_of
-from .interface import states, variables
-from .surface_vessel import HullForm, SurfaceVessel
+from .surface_vessel import HullForm, SurfaceVessel, states, variables
 
 #: number of stations along the hull for the cross-flow drag
 DRAG_STATIONS = 21

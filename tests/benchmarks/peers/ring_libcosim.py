@@ -19,7 +19,8 @@ from libcosimpy.CosimObserver import CosimObserver
 SYSTEM = """<?xml version="1.0" encoding="utf-8" ?>
 <OspSystemStructure xmlns="http://opensimulationplatform.com/MSMI/OSPSystemStructure" version="0.1">
 <StartTime>0.0</StartTime>
-<BaseStepSize>{step}</BaseStepSize><Algorithm>fixedStep</Algorithm><Simulators>{simulators}</Simulators>
+<BaseStepSize>{step}</BaseStepSize>
+<Algorithm>fixedStep</Algorithm><Simulators>{simulators}</Simulators>
 <Connections>{connections}</Connections></OspSystemStructure>"""
 SIMULATOR = '<Simulator name="{}" source="Lag.fmu"/>'
 CONNECTION = """<VariableConnection><Variable simulator="{}" name="y1"/>

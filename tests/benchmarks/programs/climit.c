@@ -2,11 +2,11 @@
 
    climit LIBRARY TOKEN RESOURCES RING INSTANCES WIDTH INPUT OUTPUT RECORDED STEPS
 
-   RING 1: instances of a lag of WIDTH in a ring, Jacobi: get all outputs, set all inputs, step all instances.
-   RING 0: one instance without inputs: step, then get its outputs.
-   INPUT and OUTPUT are the value references of the first input and output; the others are consecutive. The first RECORDED
-   outputs are recorded in every step. Prints the CPU time (us) per step and the last value.
-   The macro CALLS names the header with the calls of an FMI version. */
+   RING 1: instances of a lag of WIDTH in a ring, Jacobi: get all outputs, set all inputs, step all
+   instances. RING 0: one instance without inputs: step, then get its outputs. INPUT and OUTPUT are
+   the value references of the first input and output; the others are consecutive. The first
+   RECORDED outputs are recorded in every step. Prints the CPU time (us) per step and the last
+   value. The macro CALLS names the header with the calls of an FMI version. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <stdio.h>
@@ -38,7 +38,9 @@ static int fail(const char *reason)
 
 int main(int argc, char **argv)
 {
-    if (argc != 11) return fail("usage: climit LIBRARY TOKEN RESOURCES RING INSTANCES WIDTH INPUT OUTPUT RECORDED STEPS");
+    if (argc != 11)
+        return fail("usage: climit LIBRARY TOKEN RESOURCES RING INSTANCES WIDTH INPUT OUTPUT "
+                    "RECORDED STEPS");
     const int ring = atoi(argv[4]), n = atoi(argv[5]);
     const size_t width = (size_t)atol(argv[6]), recorded = (size_t)atol(argv[9]);
     const long steps = atol(argv[10]);
@@ -48,18 +50,22 @@ int main(int argc, char **argv)
     const Reference *inputs = references(argv[7], width), *outputs = references(argv[8], width);
     const double step_size = 0.01;
     Instance *instances = malloc((size_t)n * sizeof *instances);
-    double *y = malloc((size_t)n * width * sizeof *y), *record = malloc((size_t)steps * recorded * sizeof *record), *row = record;
+    double *y = malloc((size_t)n * width * sizeof *y),
+           *record = malloc((size_t)steps * recorded * sizeof *record), *row = record;
     for (int i = 0; i < n; i++)
         if ((instances[i] = start(library, argv[2], argv[3])) == NULL) return fail("no instance");
 
     const double begin = cpu_seconds();
     for (long k = 0; k < steps; k++) {
         if (ring) {
-            for (int i = 0; i < n; i++) get(&calls, instances[i], outputs, width, y + (size_t)i * width);
-            for (int i = 0; i < n; i++) set(&calls, instances[i], inputs, width, y + (size_t)((i + n - 1) % n) * width);
+            for (int i = 0; i < n; i++)
+                get(&calls, instances[i], outputs, width, y + (size_t)i * width);
+            for (int i = 0; i < n; i++)
+                set(&calls, instances[i], inputs, width, y + (size_t)((i + n - 1) % n) * width);
         }
         for (int i = 0; i < n; i++)
-            if (step(&calls, instances[i], (double)k * step_size, step_size) > WORST) return fail("doStep failed");
+            if (step(&calls, instances[i], (double)k * step_size, step_size) > WORST)
+                return fail("doStep failed");
         if (!ring) get(&calls, instances[0], outputs, width, y);
         for (size_t i = 0; i < recorded; i++) row[i] = y[i];
         row += recorded;

@@ -1,5 +1,5 @@
-/* A near-empty FMI 2.0 Model Exchange FMU without events, x' = u - x, and with -DLOOP a plain C loop over its functions.
-   Value references: 0 u, 1 x, 2 der(x). */
+/* A near-empty FMI 2.0 Model Exchange FMU without events, x' = u - x, and with -DLOOP a plain C
+   loop over its functions. Value references: 0 u, 1 x, 2 der(x). */
 #include <stdio.h>
 #include <stdlib.h>
 #include "fmi2Functions.h"
@@ -8,13 +8,15 @@
 typedef struct { double r[3]; } Lag;
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
-                              const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging) {
+                              const fmi2CallbackFunctions *callbacks, fmi2Boolean visible,
+                              fmi2Boolean logging) {
     Lag *m = calloc(1, sizeof(Lag));
     m->r[1] = 1;
     return m;
 }
 void fmi2FreeInstance(fmi2Component c) { free(c); }
-fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean td, fmi2Real t, fmi2Real start, fmi2Boolean sd, fmi2Real stop) {
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean td, fmi2Real t, fmi2Real start,
+                               fmi2Boolean sd, fmi2Real stop) {
     return fmi2OK;
 }
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
@@ -40,7 +42,8 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real d[], size_t n) {
     return fmi2OK;
 }
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real z[], size_t n) { return fmi2OK; }
-fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set, fmi2Boolean *enter, fmi2Boolean *terminate) {
+fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set, fmi2Boolean *enter,
+                                       fmi2Boolean *terminate) {
     *enter = *terminate = fmi2False;
     return fmi2OK;
 }
@@ -48,12 +51,14 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     for (size_t k = 0; k < n; k++) v[k] = ((Lag *)c)->r[vr[k]];
     return fmi2OK;
 }
-fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real v[]) {
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                       const fmi2Real v[]) {
     for (size_t k = 0; k < n; k++) ((Lag *)c)->r[vr[k]] = v[k];
     return fmi2OK;
 }
 
-#else /* arguments: library, number of steps; prints the CPU time (us) per step and the last value */
+/* arguments: library, number of steps; prints the CPU time (us) per step and the last value */
+#else
 #include <dlfcn.h>
 #include <time.h>
 
@@ -63,10 +68,14 @@ int main(int argc, char **argv) {
     void *library = dlopen(argv[1], RTLD_NOW);
     long steps = atol(argv[2]);
     if (!library) return 1;
-    FUNCTION(fmi2Instantiate); FUNCTION(fmi2SetTime); FUNCTION(fmi2SetContinuousStates); FUNCTION(fmi2GetDerivatives);
+    FUNCTION(fmi2Instantiate);
+    FUNCTION(fmi2SetTime);
+    FUNCTION(fmi2SetContinuousStates);
+    FUNCTION(fmi2GetDerivatives);
     FUNCTION(fmi2CompletedIntegratorStep); FUNCTION(fmi2GetReal);
     static const fmi2CallbackFunctions callbacks = {NULL, calloc, free, NULL, NULL};
-    fmi2Component c = fmi2Instantiate_("lag", fmi2ModelExchange, "lag", "", &callbacks, fmi2False, fmi2False);
+    fmi2Component c =
+        fmi2Instantiate_("lag", fmi2ModelExchange, "lag", "", &callbacks, fmi2False, fmi2False);
     double *rows = malloc((size_t)(steps + 1) * 2 * sizeof(double)), x = 1, dx, h = 0.01;
     const fmi2ValueReference output = 1;
     clock_t begin = clock();
@@ -81,7 +90,8 @@ int main(int argc, char **argv) {
         rows[2 * n] = (double)(n + 1) * h;
         if (fmi2GetReal_(c, &output, 1, rows + 2 * n + 1)) return 2;
     }
-    printf("%.17g %.17g\n", 1e6 * (double)(clock() - begin) / CLOCKS_PER_SEC / (double)steps, rows[2 * steps - 1]);
+    printf("%.17g %.17g\n", 1e6 * (double)(clock() - begin) / CLOCKS_PER_SEC / (double)steps,
+           rows[2 * steps - 1]);
     return 0;
 }
 #endif

@@ -14,25 +14,30 @@ typedef struct {
 
 static Calls look_up(void *library)
 {
-    return (Calls){dlsym(library, "fmi3GetFloat64"), dlsym(library, "fmi3SetFloat64"), dlsym(library, "fmi3DoStep")};
+    return (Calls){dlsym(library, "fmi3GetFloat64"), dlsym(library, "fmi3SetFloat64"),
+                   dlsym(library, "fmi3DoStep")};
 }
 
 static Instance start(void *library, const char *token, const char *resources)
 {
     fmi3InstantiateCoSimulationTYPE *instantiate = dlsym(library, "fmi3InstantiateCoSimulation");
-    Instance instance = instantiate("lag", token, resources, fmi3False, fmi3False, fmi3False, fmi3False, NULL, 0, NULL, NULL, NULL);
+    Instance instance = instantiate("lag", token, resources, fmi3False, fmi3False, fmi3False,
+                                    fmi3False, NULL, 0, NULL, NULL, NULL);
     if (instance == NULL) return NULL;
-    ((fmi3EnterInitializationModeTYPE *)dlsym(library, "fmi3EnterInitializationMode"))(instance, fmi3False, 0, 0, fmi3False, 0);
+    ((fmi3EnterInitializationModeTYPE *)dlsym(library, "fmi3EnterInitializationMode"))(
+        instance, fmi3False, 0, 0, fmi3False, 0);
     ((fmi3ExitInitializationModeTYPE *)dlsym(library, "fmi3ExitInitializationMode"))(instance);
     return instance;
 }
 
-static inline int get(const Calls *calls, Instance instance, const Reference *references, size_t n, double *values)
+static inline int get(const Calls *calls, Instance instance, const Reference *references, size_t n,
+                      double *values)
 {
     return calls->get(instance, references, n, values, n);
 }
 
-static inline int set(const Calls *calls, Instance instance, const Reference *references, size_t n, const double *values)
+static inline int set(const Calls *calls, Instance instance, const Reference *references, size_t n,
+                      const double *values)
 {
     return calls->set(instance, references, n, values, n);
 }

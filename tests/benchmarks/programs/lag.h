@@ -3,7 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Indices of the values. They are the FMI 3.0 value references; FMI 2.0 value references begin with 0 at the inputs. */
+/* Indices of the values. They are the FMI 3.0 value references; FMI 2.0 value references begin with
+   0 at the inputs. */
 enum { TIME, U, Y = U + WIDTH, VALUES = Y + WIDTH };
 
 typedef struct {

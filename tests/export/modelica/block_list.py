@@ -110,7 +110,9 @@ CIRCUITS = {
 
 _TEXT = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:[^"\\]|\\.)*"', re.DOTALL)
 _CLASS = re.compile(
-    r"(?P<partial>\bpartial\s+)?\b(?P<kind>block|model|package|function|record|connector|type|class)\s+(?P<name>[A-Za-z_]\w*)"
+    r"(?P<partial>\bpartial\s+)?"
+    r"\b(?P<kind>block|model|package|function|record|connector|type|class)\s+"
+    r"(?P<name>[A-Za-z_]\w*)"
     r"(?P<short>\s*=)?|\bend\s+(?P<end>[A-Za-z_]\w*)\s*;"
 )
 _WITHIN = re.compile(r"\bwithin\s+([\w.]*)\s*;")

@@ -14,10 +14,9 @@ from world_harness import WorldHarness, quadcopter_settings
 from cosim.core import resources
 from cosim.core.errors import InputError
 from cosim.core.units import parse_unit
-from plant_src.catalogue import MODELS
+from plant_src.catalogue import MODELS, Model
 from plant_src.physics import compiled_equations
 from plant_src.physics.compiled_equations import CompiledEquations
-from plant_src.vehicles.model import Model
 
 
 @pytest.fixture
@@ -160,7 +159,7 @@ def test_other_start_values_and_descriptions_are_the_same_equations() -> None:
 
 
 def test_another_division_into_arrays_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("plant_src.vehicles.model.ENVIRONMENT_INPUTS", {"wind.x", "wave_gain"})
+    monkeypatch.setattr("plant_src.catalogue.ENVIRONMENT_INPUTS", {"wind.x", "wave_gain"})
     with pytest.raises(
         InputError,
         match=r'array "inputs" of other size: found 8 elements, expected 12; rebuild it with `',

@@ -9,9 +9,15 @@ import numpy as np
 from plant_validation import MeasurementCheck
 from scipy.spatial.transform import Rotation
 
-from plant_src.vehicles.multirotor.airframe import MAX_ROTORS, Airframe, Hull, Rotor, RotorEffects
+from plant_src.vehicles.multirotor.airframe import (
+    MAX_ROTORS,
+    Airframe,
+    Hull,
+    Rotor,
+    RotorEffects,
+    variables,
+)
 from plant_src.vehicles.multirotor.equations import MultirotorEquations
-from plant_src.vehicles.multirotor.interface import variables
 
 RANDOM = np.random.default_rng(20)
 MASS, GRAVITY, RADIUS, LAG, SPIN_INERTIA = 3.0, 9.7, 0.08, 0.05, 2e-5

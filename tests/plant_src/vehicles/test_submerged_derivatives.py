@@ -10,9 +10,8 @@ from plant_validation import MeasurementCheck
 from scipy.spatial.transform import Rotation
 from submerged_reference import derivative
 
-from plant_src.vehicles.submerged.craft import MAX_THRUSTERS, Craft, Thruster
+from plant_src.vehicles.submerged.craft import MAX_THRUSTERS, Craft, Thruster, variables
 from plant_src.vehicles.submerged.equations import SubmergedEquations
-from plant_src.vehicles.submerged.interface import variables
 
 RANDOM = np.random.default_rng(21)
 

@@ -1,6 +1,6 @@
-/* Attacks of an FMU on files, processes and resources outside. Each line "attack NAME TARGET" in resources/fault.txt of the FMU
-   is one; its outcome is a line "attack NAME: reached" or "attack NAME: ERROR" on standard error. What an attack creates for the
-   whole system, it removes. */
+/* Attacks of an FMU on files, processes and resources outside. Each line "attack NAME TARGET" in
+   resources/fault.txt of the FMU is one; its outcome is a line "attack NAME: reached" or "attack
+   NAME: ERROR" on standard error. What an attack creates for the whole system, it removes. */
 #define _GNU_SOURCE
 #include <arpa/inet.h>
 #include <dirent.h>
@@ -86,11 +86,15 @@ ATTACK(change_mode) { return CALL(chmod(target, 0777)); }
 ATTACK(change_mode_at) { return CALL(fchmodat(AT_FDCWD, target, 0777, 0)); }
 ATTACK(change_owner) { return CALL(chown(target, getuid(), getgid())); }
 ATTACK(change_times) { return CALL(utimes(target, (struct timeval[2]){{1, 0}, {1, 0}})); }
-ATTACK(change_times_at) { return CALL(utimensat(AT_FDCWD, target, (struct timespec[2]){{1, 0}, {1, 0}}, 0)); }
+ATTACK(change_times_at) {
+    return CALL(utimensat(AT_FDCWD, target, (struct timespec[2]){{1, 0}, {1, 0}}, 0));
+}
 ATTACK(set_attribute) { return CALL(setxattr(target, "user.attack", "x", 1, 0)); }
 ATTACK(read_attribute) {
     char value[8] = "";
-    return getxattr(target, "user.attack", value, sizeof value) < 0 ? errno : strcmp(value, "secret") ? EIO : 0;
+    return getxattr(target, "user.attack", value, sizeof value) < 0 ? errno
+           : strcmp(value, "secret")                                ? EIO
+                                                                    : 0;
 }
 ATTACK(watch_folder) {
     int watch = inotify_init();
@@ -98,7 +102,8 @@ ATTACK(watch_folder) {
 }
 ATTACK(create_device) { /* in the folder for temporary files; the device is /dev/null */
     const char *folder = getenv("TMPDIR");
-    return CALL(mknod(with_suffix(folder ? folder : "/tmp", "/device"), S_IFCHR | 0666, 1 << 8 | 3));
+    return CALL(
+        mknod(with_suffix(folder ? folder : "/tmp", "/device"), S_IFCHR | 0666, 1 << 8 | 3));
 }
 ATTACK(open_by_handle) {
     struct { struct file_handle head; unsigned char bytes[128]; } handle = {{128}};
@@ -176,7 +181,9 @@ static int open_of_process(const char *target, const char *name, int flags) {
 ATTACK(read_environment_of_process) { return use(open_of_process(target, "environ", O_RDONLY)); }
 ATTACK(change_limits) { return CALL(prlimit(PID, RLIMIT_NOFILE, &(struct rlimit){64, 64}, NULL)); }
 ATTACK(change_priority) { return CALL(setpriority(PRIO_PROCESS, PID, 7)); }
-ATTACK(change_scheduler) { return CALL(sched_setscheduler(PID, SCHED_BATCH, &(struct sched_param){0})); }
+ATTACK(change_scheduler) {
+    return CALL(sched_setscheduler(PID, SCHED_BATCH, &(struct sched_param){0}));
+}
 ATTACK(change_processors) {
     cpu_set_t one;
     CPU_ZERO(&one);
@@ -189,7 +196,9 @@ ATTACK(offer_to_memory_killer) {
     return file < 0 ? errno : CALL(write(file, "900", 3));
 }
 ATTACK(outlive_importer) { return CALL(prctl(PR_SET_PDEATHSIG, 0)); }
-ATTACK(raise_limits) { return CALL(setrlimit(RLIMIT_CORE, &(struct rlimit){RLIM_INFINITY, RLIM_INFINITY})); }
+ATTACK(raise_limits) {
+    return CALL(setrlimit(RLIMIT_CORE, &(struct rlimit){RLIM_INFINITY, RLIM_INFINITY}));
+}
 
 /* -- network and sockets -- */
 static int send_to(int family, int kind, const void *address, socklen_t size) {
@@ -219,7 +228,8 @@ ATTACK(server_without_bind) { return serve(0); }
 static int send_to_name(int kind, const char *name, int abstract) {
     struct sockaddr_un to = {AF_UNIX};
     snprintf(to.sun_path + abstract, sizeof to.sun_path - abstract, "%s", name);
-    return send_to(AF_UNIX, kind, &to, offsetof(struct sockaddr_un, sun_path) + abstract + strlen(name));
+    return send_to(AF_UNIX, kind, &to,
+                   offsetof(struct sockaddr_un, sun_path) + abstract + strlen(name));
 }
 ATTACK(local_stream) { return send_to_name(SOCK_STREAM, target, 0); }
 ATTACK(local_datagram) { return send_to_name(SOCK_DGRAM, target, 0); }
@@ -255,18 +265,24 @@ ATTACK(posix_memory) {
     return file < 0 ? errno : CALL(shm_unlink(target));
 }
 ATTACK(add_key) {
-    long key = syscall(SYS_add_key, "user", "cosim-attack", "x", (size_t)1, KEY_SPEC_PROCESS_KEYRING);
+    long key =
+        syscall(SYS_add_key, "user", "cosim-attack", "x", (size_t)1, KEY_SPEC_PROCESS_KEYRING);
     return key < 0 ? errno : CALL(syscall(SYS_keyctl, KEYCTL_REVOKE, key));
 }
-ATTACK(find_keyring) { return CALL(syscall(SYS_keyctl, KEYCTL_GET_KEYRING_ID, KEY_SPEC_USER_KEYRING, 1)); }
+ATTACK(find_keyring) {
+    return CALL(syscall(SYS_keyctl, KEYCTL_GET_KEYRING_ID, KEY_SPEC_USER_KEYRING, 1));
+}
 ATTACK(memory_file) { return use(memfd_create("attack", 0)); }
 
 /* -- the kernel -- */
-ATTACK(user_namespace) { /* in a child, where there can be one: the process stays in the namespace */
+/* in a child, where there can be one: the process stays in the namespace */
+ATTACK(user_namespace) {
     pid_t child = fork();
     int status = 0;
     if (child == 0) _exit(unshare(CLONE_NEWUSER) ? errno : 0);
-    return child < 0 ? CALL(unshare(CLONE_NEWUSER)) : waitpid(child, &status, 0) < 0 ? errno : WEXITSTATUS(status);
+    return child < 0                        ? CALL(unshare(CLONE_NEWUSER))
+           : waitpid(child, &status, 0) < 0 ? errno
+                                            : WEXITSTATUS(status);
 }
 ATTACK(io_ring) {
     char parameters[256] = "";
@@ -275,22 +291,79 @@ ATTACK(io_ring) {
 ATTACK(kernel_log) { return CALL(klogctl(10, NULL, 0)); }
 ATTACK(fixed_addresses) { return CALL(personality(ADDR_NO_RANDOMIZE)); }
 #define ENTRY(NAME) {#NAME, NAME}
-static const struct { const char *name; int (*act)(const char *); } ATTACKS[] = {
-    ENTRY(read_file), ENTRY(read_users), ENTRY(list_folder), ENTRY(list_processes), ENTRY(create_file), ENTRY(append_to_file),
-    ENTRY(truncate_file), ENTRY(truncate_by_reading), ENTRY(delete_file), ENTRY(rename_file), ENTRY(link_file),
-    ENTRY(create_symlink), ENTRY(create_folder), ENTRY(create_fifo), ENTRY(create_socket_file), ENTRY(change_mode),
-    ENTRY(change_mode_at), ENTRY(change_owner), ENTRY(change_times), ENTRY(change_times_at), ENTRY(set_attribute),
+static const struct { const char *name; int (*act)(const char *);
+} ATTACKS[] = {
+    ENTRY(read_file),
+    ENTRY(read_users),
+    ENTRY(list_folder),
+    ENTRY(list_processes),
+    ENTRY(create_file),
+    ENTRY(append_to_file),
+    ENTRY(truncate_file),
+    ENTRY(truncate_by_reading),
+    ENTRY(delete_file),
+    ENTRY(rename_file),
+    ENTRY(link_file),
+    ENTRY(create_symlink),
+    ENTRY(create_folder),
+    ENTRY(create_fifo),
+    ENTRY(create_socket_file),
+    ENTRY(change_mode),
+    ENTRY(change_mode_at),
+    ENTRY(change_owner),
+    ENTRY(change_times),
+    ENTRY(change_times_at),
+    ENTRY(set_attribute),
     ENTRY(read_attribute),
-    ENTRY(watch_folder), ENTRY(create_device), ENTRY(open_by_handle), ENTRY(environment), ENTRY(environment_file),
-    ENTRY(environment_memory), ENTRY(fork_process), ENTRY(fork_by_clone), ENTRY(run_program), ENTRY(leave_process),
-    ENTRY(kill_process), ENTRY(kill_importer), ENTRY(signal_thread), ENTRY(queue_signal), ENTRY(signal_by_descriptor),
-    ENTRY(signal_by_pipe), ENTRY(trace_process), ENTRY(read_memory), ENTRY(read_environment_of_process), ENTRY(change_limits),
-    ENTRY(change_priority), ENTRY(change_scheduler), ENTRY(change_processors), ENTRY(change_io_priority),
-    ENTRY(offer_to_memory_killer), ENTRY(outlive_importer), ENTRY(raise_limits), ENTRY(tcp), ENTRY(udp), ENTRY(tcp6),
-    ENTRY(server), ENTRY(server_without_bind), ENTRY(local_stream), ENTRY(local_datagram), ENTRY(abstract_socket),
-    ENTRY(socket_pair), ENTRY(list_interfaces), ENTRY(shared_memory), ENTRY(message_queue), ENTRY(semaphores), ENTRY(posix_queue),
-    ENTRY(posix_memory), ENTRY(add_key), ENTRY(find_keyring), ENTRY(memory_file), ENTRY(user_namespace), ENTRY(io_ring),
-    ENTRY(kernel_log), ENTRY(fixed_addresses),
+    ENTRY(watch_folder),
+    ENTRY(create_device),
+    ENTRY(open_by_handle),
+    ENTRY(environment),
+    ENTRY(environment_file),
+    ENTRY(environment_memory),
+    ENTRY(fork_process),
+    ENTRY(fork_by_clone),
+    ENTRY(run_program),
+    ENTRY(leave_process),
+    ENTRY(kill_process),
+    ENTRY(kill_importer),
+    ENTRY(signal_thread),
+    ENTRY(queue_signal),
+    ENTRY(signal_by_descriptor),
+    ENTRY(signal_by_pipe),
+    ENTRY(trace_process),
+    ENTRY(read_memory),
+    ENTRY(read_environment_of_process),
+    ENTRY(change_limits),
+    ENTRY(change_priority),
+    ENTRY(change_scheduler),
+    ENTRY(change_processors),
+    ENTRY(change_io_priority),
+    ENTRY(offer_to_memory_killer),
+    ENTRY(outlive_importer),
+    ENTRY(raise_limits),
+    ENTRY(tcp),
+    ENTRY(udp),
+    ENTRY(tcp6),
+    ENTRY(server),
+    ENTRY(server_without_bind),
+    ENTRY(local_stream),
+    ENTRY(local_datagram),
+    ENTRY(abstract_socket),
+    ENTRY(socket_pair),
+    ENTRY(list_interfaces),
+    ENTRY(shared_memory),
+    ENTRY(message_queue),
+    ENTRY(semaphores),
+    ENTRY(posix_queue),
+    ENTRY(posix_memory),
+    ENTRY(add_key),
+    ENTRY(find_keyring),
+    ENTRY(memory_file),
+    ENTRY(user_namespace),
+    ENTRY(io_ring),
+    ENTRY(kernel_log),
+    ENTRY(fixed_addresses),
 };
 
 void attack(const char *name, const char *target) {

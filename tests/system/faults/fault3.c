@@ -1,5 +1,5 @@
-/* The misbehaving lag as FMI 3.0 FMU. Value references: Float64 0 time, 1 u, 2 y, 3 y_start, 4 T; String 5 fault;
-   Float64 6 v, an array of 3 elements: y, 2 y, 3 y. */
+/* The misbehaving lag as FMI 3.0 FMU. Value references: Float64 0 time, 1 u, 2 y, 3 y_start, 4 T;
+   String 5 fault; Float64 6 v, an array of 3 elements: y, 2 y, 3 y. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,9 +16,9 @@ void say(int status, const char *category, const char *text) {
     if (voice) voice(voice_environment, (fmi3Status)status, category, text);
 }
 
-#define ENTER(NAME, ...)                                                                                                   \
-    Lag *m = c;                                                                                                            \
-    int status = enter(m, NAME, __VA_ARGS__);                                                                              \
+#define ENTER(NAME, ...) \
+    Lag *m = c; \
+    int status = enter(m, NAME, __VA_ARGS__); \
     if (status > WARNING) return (fmi3Status)status
 
 const char *fmi3GetVersion(void) { return enter(NULL, "GetVersion", " ") ? NULL : "3.0"; }
@@ -26,30 +26,34 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const f
     ENTER("SetDebugLogging", "%d", on);
     return (fmi3Status)status;
 }
-fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
-                                         fmi3Boolean logging, fmi3Boolean events, fmi3Boolean early,
-                                         const fmi3ValueReference required[], size_t n, fmi3InstanceEnvironment environment,
-                                         fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update) {
+fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources,
+                                         fmi3Boolean visible, fmi3Boolean logging,
+                                         fmi3Boolean events, fmi3Boolean early,
+                                         const fmi3ValueReference required[], size_t n,
+                                         fmi3InstanceEnvironment environment,
+                                         fmi3LogMessageCallback log,
+                                         fmi3IntermediateUpdateCallback update) {
     voice = log;
     voice_environment = environment;
-    int status = enter(NULL, "InstantiateCoSimulation", "name=%s token=%s events=%d early=%d", name, token, events, early);
+    int status = enter(NULL, "InstantiateCoSimulation", "name=%s token=%s events=%d early=%d", name,
+                       token, events, early);
     return status > WARNING ? NULL : new_lag(name);
 }
 void fmi3FreeInstance(fmi3Instance c) {
     enter(c, "FreeInstance", " ");
     free(c);
 }
-fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean td, fmi3Float64 t, fmi3Float64 begin, fmi3Boolean sd,
-                                       fmi3Float64 stop) {
+fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean td, fmi3Float64 t,
+                                       fmi3Float64 begin, fmi3Boolean sd, fmi3Float64 stop) {
     ENTER("EnterInitializationMode", "start=%.17g stop=%.17g", begin, sd ? stop : -1);
     m->time = begin;
     return (fmi3Status)status;
 }
-#define CALL(NAME, WORK)                                                                                                   \
-    fmi3Status fmi3##NAME(fmi3Instance c) {                                                                                \
-        ENTER(#NAME, " ");                                                                                                 \
-        WORK;                                                                                                              \
-        return (fmi3Status)status;                                                                                         \
+#define CALL(NAME, WORK) \
+    fmi3Status fmi3##NAME(fmi3Instance c) { \
+        ENTER(#NAME, " "); \
+        WORK; \
+        return (fmi3Status)status; \
     }
 CALL(ExitInitializationMode, lag_start(m))
 CALL(EnterStepMode, )
@@ -72,7 +76,8 @@ static int get(Lag *m, const fmi3ValueReference vr[], size_t n, fmi3Float64 v[],
             v[place++] = value(m, vr[k]);
     return 0;
 }
-fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Float64 v[], size_t nv) {
+fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Float64 v[],
+                          size_t nv) {
     if (get(c, vr, n, v, nv)) return fmi3Error;
     char values[512];
     record_values(values, sizeof values, vr, n, v);
@@ -80,24 +85,28 @@ fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
     get(m, vr, n, v, nv);
     return (fmi3Status)status;
 }
-fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Float64 v[], size_t nv) {
+fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
+                          const fmi3Float64 v[], size_t nv) {
     char values[512];
     record_values(values, sizeof values, vr, n, v);
     ENTER("SetFloat64", "%s", values);
     for (size_t k = 0; k < n; k++) m->x[(vr[k] - 1) % REALS] = v[k];
     return (fmi3Status)status;
 }
-fmi3Status fmi3GetString(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3String v[], size_t nv) {
+fmi3Status fmi3GetString(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3String v[],
+                         size_t nv) {
     ENTER("GetString", " ");
     for (size_t k = 0; k < n; k++) v[k] = m->speechless ? NULL : m->text;
     return (fmi3Status)status;
 }
-fmi3Status fmi3SetString(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3String v[], size_t nv) {
+fmi3Status fmi3SetString(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
+                         const fmi3String v[], size_t nv) {
     ENTER("SetString", "%s", v[0]);
     tell(m, v[0]);
     return (fmi3Status)status;
 }
-fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n, size_t sizes[], fmi3Binary v[], size_t nv) {
+fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n, size_t sizes[],
+                         fmi3Binary v[], size_t nv) {
     ENTER("GetBinary", " ");
     for (size_t k = 0; k < nv; k++) {
         v[k] = (fmi3Binary)m->text;
@@ -105,8 +114,9 @@ fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n
     }
     return (fmi3Status)status;
 }
-fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean no_set_state, fmi3Boolean *event,
-                      fmi3Boolean *terminate, fmi3Boolean *early, fmi3Float64 *reached) {
+fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean no_set_state,
+                      fmi3Boolean *event, fmi3Boolean *terminate, fmi3Boolean *early,
+                      fmi3Float64 *reached) {
     ((Lag *)c)->time = t;
     ENTER("DoStep", "t=%.17g h=%.17g", t, h);
     double y = m->x[Y];
@@ -123,16 +133,25 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean 
 #define REFUSED(NAME) fmi3Status fmi3##NAME(void) { return fmi3Error; }
 #define NONE(NAME) fmi3Instance fmi3##NAME(void) { return NULL; }
 #define OTHER_TYPE(TYPE) REFUSED(Get##TYPE) REFUSED(Set##TYPE)
-NONE(InstantiateModelExchange) NONE(InstantiateScheduledExecution)
-OTHER_TYPE(Float32) OTHER_TYPE(Int8) OTHER_TYPE(UInt8) OTHER_TYPE(Int16) OTHER_TYPE(UInt16) OTHER_TYPE(Int32)
-OTHER_TYPE(UInt32) OTHER_TYPE(Int64) OTHER_TYPE(UInt64) OTHER_TYPE(Boolean) OTHER_TYPE(Clock) REFUSED(SetBinary)
-REFUSED(EnterEventMode) REFUSED(GetFMUState) REFUSED(SetFMUState) REFUSED(FreeFMUState)
-REFUSED(GetNumberOfVariableDependencies) REFUSED(GetVariableDependencies) REFUSED(SerializedFMUStateSize)
-REFUSED(SerializeFMUState) REFUSED(DeserializeFMUState) REFUSED(GetDirectionalDerivative) REFUSED(GetAdjointDerivative)
-REFUSED(EnterConfigurationMode) REFUSED(ExitConfigurationMode) REFUSED(GetIntervalDecimal) REFUSED(GetIntervalFraction)
-REFUSED(GetShiftDecimal) REFUSED(GetShiftFraction) REFUSED(SetIntervalDecimal) REFUSED(SetIntervalFraction)
-REFUSED(SetShiftDecimal) REFUSED(SetShiftFraction) REFUSED(EvaluateDiscreteStates) REFUSED(UpdateDiscreteStates)
-REFUSED(EnterContinuousTimeMode) REFUSED(CompletedIntegratorStep) REFUSED(SetTime) REFUSED(SetContinuousStates)
-REFUSED(GetContinuousStateDerivatives) REFUSED(GetEventIndicators) REFUSED(GetContinuousStates)
-REFUSED(GetNominalsOfContinuousStates) REFUSED(GetNumberOfEventIndicators) REFUSED(GetNumberOfContinuousStates)
-REFUSED(GetOutputDerivatives) REFUSED(ActivateModelPartition)
+NONE(InstantiateModelExchange)
+NONE(InstantiateScheduledExecution) OTHER_TYPE(Float32) OTHER_TYPE(Int8) OTHER_TYPE(UInt8)
+    OTHER_TYPE(Int16) OTHER_TYPE(UInt16) OTHER_TYPE(Int32) OTHER_TYPE(UInt32) OTHER_TYPE(Int64)
+        OTHER_TYPE(UInt64) OTHER_TYPE(Boolean) OTHER_TYPE(Clock) REFUSED(SetBinary) REFUSED(
+            EnterEventMode) REFUSED(GetFMUState) REFUSED(SetFMUState) REFUSED(FreeFMUState)
+            REFUSED(GetNumberOfVariableDependencies) REFUSED(GetVariableDependencies) REFUSED(
+                SerializedFMUStateSize) REFUSED(SerializeFMUState) REFUSED(DeserializeFMUState)
+                REFUSED(GetDirectionalDerivative) REFUSED(GetAdjointDerivative)
+                    REFUSED(EnterConfigurationMode) REFUSED(ExitConfigurationMode) REFUSED(
+                        GetIntervalDecimal) REFUSED(GetIntervalFraction) REFUSED(GetShiftDecimal)
+                        REFUSED(GetShiftFraction) REFUSED(SetIntervalDecimal) REFUSED(
+                            SetIntervalFraction) REFUSED(SetShiftDecimal) REFUSED(SetShiftFraction)
+                            REFUSED(EvaluateDiscreteStates) REFUSED(UpdateDiscreteStates)
+                                REFUSED(EnterContinuousTimeMode) REFUSED(CompletedIntegratorStep)
+                                    REFUSED(SetTime) REFUSED(SetContinuousStates)
+                                        REFUSED(GetContinuousStateDerivatives)
+                                            REFUSED(GetEventIndicators) REFUSED(GetContinuousStates)
+                                                REFUSED(GetNominalsOfContinuousStates)
+                                                    REFUSED(GetNumberOfEventIndicators)
+                                                        REFUSED(GetNumberOfContinuousStates)
+                                                            REFUSED(GetOutputDerivatives)
+                                                                REFUSED(ActivateModelPartition)

@@ -1,6 +1,7 @@
-/* Whatever can go wrong in a library that other people wrote. What and when stands in resources/fault.txt of the FMU:
-   a line "fault FUNCTION WHEN WHAT", a line "record FILE", lines "attack NAME TARGET" for the fault "attack";
-   the string parameter `fault` says the same of one instance. */
+/* Whatever can go wrong in a library that other people wrote. What and when stands in
+   resources/fault.txt of the FMU: a line "fault FUNCTION WHEN WHAT", a line "record FILE", lines
+   "attack NAME TARGET" for the fault "attack"; the string parameter `fault` says the same of one
+   instance. */
 #define _GNU_SOURCE
 #include <arpa/inet.h>
 #include <dlfcn.h>
@@ -58,13 +59,15 @@ static int illegal(Lag *m) { __builtin_trap(); }
 static int deep(Lag *m) { volatile char frame[4096]; frame[0] = 1; return deep(m) + frame[0]; }
 static int free_twice(Lag *m) { void *volatile p = malloc(64); free(p); free(p); return OK; }
 static int abort_(Lag *m) { abort(); }
-static int overwrite(Lag *m) { /* all memory that is shared with another process, when that has had time to look at it */
+/* all memory that is shared with another process, when that has had time to look at it */
+static int overwrite(Lag *m) {
     FILE *maps = fopen("/proc/self/maps", "r");
     char line[PATH_MAX + 100], rights[5];
     unsigned long begin, end;
     usleep(300000);
     while (maps && fgets(line, sizeof line, maps))
-        if (sscanf(line, "%lx-%lx %4s", &begin, &end, rights) == 3 && rights[1] == 'w' && rights[3] == 's')
+        if (sscanf(line, "%lx-%lx %4s", &begin, &end, rights) == 3 && rights[1] == 'w' &&
+            rights[3] == 's')
             memset((void *)begin, 0x7f, end - begin);
     return OK;
 }
@@ -83,7 +86,8 @@ static int read_stdin(Lag *m) {
 }
 
 /* -- quantities -- */
-static int memory(Lag *m) { /* addresses only: nothing is touched, so that the machine does not suffer */
+/* addresses only: nothing is touched, so that the machine does not suffer */
+static int memory(Lag *m) {
     for (long mib = 0; mib < 65536; mib += 64)
         if (!malloc(64L << 20)) {
             say(ERROR, "error", "out of memory");
@@ -102,7 +106,10 @@ static int flood(int file) {
 }
 static int flood_stdout(Lag *m) { return flood(1); }
 static int flood_stderr(Lag *m) { return flood(2); }
-static int log_often(int count) { for (int n = 0; n < count; n++) say(OK, "info", "again"); return OK; }
+static int log_often(int count) {
+    for (int n = 0; n < count; n++) say(OK, "info", "again");
+    return OK;
+}
 static int flood_log(Lag *m) { return log_often(1000000); }
 static int log_20000(Lag *m) { return log_often(20000); }
 static int open_files(Lag *m) {
@@ -116,10 +123,18 @@ static int open_files(Lag *m) {
 /* -- log messages -- */
 static int log_directives(Lag *m) { say(WARNING, "info", "%s%s%n%d%f 100%"); return OK; }
 static int log_null(Lag *m) { say(WARNING, NULL, NULL); return OK; }
-static int log_bytes(Lag *m) { say(WARNING, "\xff", "bad \xff\xfe\x80 bytes \x1b[31m red"); return OK; }
+static int log_bytes(Lag *m) {
+    say(WARNING, "\xff", "bad \xff\xfe\x80 bytes \x1b[31m red");
+    return OK;
+}
 #define CONTROL "\x1b[31mred\x1b]0;title\a\xc2\x9b" "31m \xe2\x80\xae" "rtl\r"
 static int log_control(Lag *m) { say(WARNING, "info", CONTROL "\nERROR other: faked"); return OK; }
-static int print_control(Lag *m) { printf(CONTROL "\n"); fflush(stdout); fprintf(stderr, CONTROL "\n"); return OK; }
+static int print_control(Lag *m) {
+    printf(CONTROL "\n");
+    fflush(stdout);
+    fprintf(stderr, CONTROL "\n");
+    return OK;
+}
 static int log_long(Lag *m) {
     char *text = malloc(1 << 20);
     memset(text, 'y', 1 << 20);
@@ -128,7 +143,10 @@ static int log_long(Lag *m) {
     free(text);
     return OK;
 }
-static void *chatter(void *m) { for (int n = 0; n < 100; n++) say(OK, "info", "from a thread"); return NULL; }
+static void *chatter(void *m) {
+    for (int n = 0; n < 100; n++) say(OK, "info", "from a thread");
+    return NULL;
+}
 static int log_thread(Lag *m) {
     pthread_t thread;
     pthread_create(&thread, NULL, chatter, m);
@@ -155,15 +173,25 @@ static int limit(int kind, long most) {
 }
 static int limit_files(Lag *m) { return limit(RLIMIT_NOFILE, 3); }
 static int limit_size(Lag *m) { return limit(RLIMIT_FSIZE, 0); }
-static int set_alarm(Lag *m) { return setitimer(ITIMER_REAL, &(struct itimerval){{0, 0}, {0, 200000}}, NULL); }
+static int set_alarm(Lag *m) {
+    return setitimer(ITIMER_REAL, &(struct itimerval){{0, 0}, {0, 200000}}, NULL);
+}
 static int block_signals(Lag *m) {
     sigset_t all;
     sigfillset(&all);
     return sigprocmask(SIG_BLOCK, &all, NULL);
 }
-static int ignore_interrupts(Lag *m) { signal(SIGINT, SIG_IGN); signal(SIGTERM, SIG_IGN); return OK; }
+static int ignore_interrupts(Lag *m) {
+    signal(SIGINT, SIG_IGN);
+    signal(SIGTERM, SIG_IGN);
+    return OK;
+}
 static int close_output(Lag *m) { return close(1); }
-static int truncate_all(Lag *m) { int result = 1; for (int file = 3; file < 256; file++) result &= ftruncate(file, 0); return OK; }
+static int truncate_all(Lag *m) {
+    int result = 1;
+    for (int file = 3; file < 256; file++) result &= ftruncate(file, 0);
+    return OK;
+}
 static int close_all(Lag *m) { for (int file = 0; file < 256; file++) close(file); return OK; }
 
 /* -- what stays behind -- */
@@ -180,7 +208,8 @@ static int linger(int own_session) {
 static int fork_(Lag *m) { return linger(0); }
 static int daemon_(Lag *m) { return linger(1); }
 static int fork_return(Lag *m) { return fork() < 0; } /* the copy returns, too */
-static int fork_silently(Lag *m) { return syscall(SYS_clone, SIGCHLD, 0, 0, 0, 0) < 0; } /* unknown to the C library */
+/* unknown to the C library */
+static int fork_silently(Lag *m) { return syscall(SYS_clone, SIGCHLD, 0, 0, 0, 0) < 0; }
 static int fork_program(Lag *m) {
     pid_t child = fork();
     int status = 1;
@@ -190,12 +219,15 @@ static int fork_program(Lag *m) {
     }
     return waitpid(child, &status, 0) != child || status;
 }
-/* Write the bytes of the environment variable FAULT_ANSWER to all pipes, as a worker process answers its importer. */
+/* Write the bytes of the environment variable FAULT_ANSWER to all pipes, as a worker process
+   answers its importer. */
 static int answer(Lag *m) {
     const char *text = getenv("FAULT_ANSWER");
     struct stat status;
     for (int file = 3; text && file < 1024; file++)
-        if (!fstat(file, &status) && S_ISFIFO(status.st_mode) && write(file, text, strlen(text)) < 0) continue;
+        if (!fstat(file, &status) && S_ISFIFO(status.st_mode) &&
+            write(file, text, strlen(text)) < 0)
+            continue;
     return OK;
 }
 static void *for_ever(void *m) { for (;;) usleep(1000); }
@@ -203,7 +235,8 @@ static int thread(Lag *m) {
     Dl_info here;
     pthread_t id;
     dladdr((void *)thread, &here);
-    dlopen(here.dli_fname, RTLD_NOW | RTLD_NODELETE); /* its code stays, or it would crash at the unloading */
+    /* its code stays, or it would crash at the unloading */
+    dlopen(here.dli_fname, RTLD_NOW | RTLD_NODELETE);
     return pthread_create(&id, NULL, for_ever, m);
 }
 static int write_file(const char *path) {
@@ -228,7 +261,10 @@ static int tcp(Lag *m) { return connect_(SOCK_STREAM); }
 static int udp(Lag *m) { return connect_(SOCK_DGRAM); }
 static int processes(Lag *m) { record("process %d child of %d", getpid(), getppid()); return OK; }
 
-static int attack_all(Lag *m) { for (size_t i = 0; i < attack_count; i++) attack(attacks[i].name, attacks[i].target); return OK; }
+static int attack_all(Lag *m) {
+    for (size_t i = 0; i < attack_count; i++) attack(attacks[i].name, attacks[i].target);
+    return OK;
+}
 
 /* -- values and statuses -- */
 static int put(Lag *m, double y) { if (m) m->x[Y] = y; return OK; }
@@ -246,27 +282,94 @@ static int babble(Lag *m) { strcpy(m->text, "\xff\xfe"); return OK; }
 static int vast(Lag *m) { m->vast = 1; return OK; }
 static int event(Lag *m) { m->event = 1; return OK; }
 static int terminate(Lag *m) { m->terminate = 1; return OK; }
-#define STATUS(NAME, VALUE) static int NAME(Lag *m) { say(VALUE, "status", "told to return " #NAME); return VALUE; }
+#define STATUS(NAME, VALUE) \
+    static int NAME(Lag *m) { \
+        say(VALUE, "status", "told to return " #NAME); \
+        return VALUE; \
+    }
 STATUS(warning, WARNING) STATUS(discard, DISCARD) STATUS(error, ERROR) STATUS(fatal, FATAL)
 STATUS(pending, PENDING) STATUS(undefined, 17) STATUS(hundred, 100) STATUS(negative, -1)
 
-static const struct { const char *name; int (*act)(Lag *); } FAULTS[] = {
-    {"warning", warning}, {"discard", discard}, {"error", error}, {"fatal", fatal}, {"pending", pending},
-    {"undefined", undefined}, {"hundred", hundred}, {"negative", negative}, {"nan", nan_}, {"infinity", infinity}, {"early", early}, {"event", event},
-    {"stuck", stuck}, {"back", back}, {"beyond", beyond}, {"nowhere", nowhere}, {"spoil", spoil},
-    {"terminate", terminate}, {"speechless", speechless}, {"babble", babble}, {"vast", vast}, {"segv", segv}, {"bus", bus}, {"divide", divide}, {"illegal", illegal}, {"deep", deep},
-    {"abort", abort_}, {"overwrite", overwrite}, {"free_twice", free_twice}, {"exit_0", exit_0}, {"exit_3", exit_3}, {"exit_at_once", exit_at_once},
-    {"kill", kill_}, {"loop", loop}, {"sleep", sleep_}, {"read_stdin", read_stdin}, {"memory", memory},
-    {"flood_stdout", flood_stdout}, {"flood_stderr", flood_stderr}, {"flood_log", flood_log}, {"open_files", open_files},
-    {"log_directives", log_directives}, {"log_null", log_null}, {"log_bytes", log_bytes}, {"log_long", log_long}, {"log_control", log_control}, {"print_control", print_control},
-    {"log_thread", log_thread}, {"log_20000", log_20000}, {"round_up", round_up}, {"flush_to_zero", flush_to_zero}, {"fp_traps", fp_traps},
-    {"give_up_files", give_up_files}, {"change_folder", change_folder}, {"change_locale", change_locale}, {"change_umask", change_umask},
-    {"limit_files", limit_files}, {"limit_size", limit_size}, {"set_alarm", set_alarm}, {"block_signals", block_signals},
-    {"change_environment", change_environment}, {"ignore_interrupts", ignore_interrupts}, {"close_output", close_output},
-    {"truncate_all", truncate_all}, {"close_all", close_all}, {"fork", fork_}, {"daemon", daemon_}, {"answer", answer},
-    {"fork_return", fork_return}, {"fork_silently", fork_silently}, {"fork_program", fork_program},
-    {"thread", thread}, {"write_here", write_here}, {"attack", attack_all},
-    {"write_temporary", write_temporary}, {"tcp", tcp}, {"udp", udp}, {"processes", processes},
+static const struct { const char *name; int (*act)(Lag *);
+} FAULTS[] = {
+    {"warning", warning},
+    {"discard", discard},
+    {"error", error},
+    {"fatal", fatal},
+    {"pending", pending},
+    {"undefined", undefined},
+    {"hundred", hundred},
+    {"negative", negative},
+    {"nan", nan_},
+    {"infinity", infinity},
+    {"early", early},
+    {"event", event},
+    {"stuck", stuck},
+    {"back", back},
+    {"beyond", beyond},
+    {"nowhere", nowhere},
+    {"spoil", spoil},
+    {"terminate", terminate},
+    {"speechless", speechless},
+    {"babble", babble},
+    {"vast", vast},
+    {"segv", segv},
+    {"bus", bus},
+    {"divide", divide},
+    {"illegal", illegal},
+    {"deep", deep},
+    {"abort", abort_},
+    {"overwrite", overwrite},
+    {"free_twice", free_twice},
+    {"exit_0", exit_0},
+    {"exit_3", exit_3},
+    {"exit_at_once", exit_at_once},
+    {"kill", kill_},
+    {"loop", loop},
+    {"sleep", sleep_},
+    {"read_stdin", read_stdin},
+    {"memory", memory},
+    {"flood_stdout", flood_stdout},
+    {"flood_stderr", flood_stderr},
+    {"flood_log", flood_log},
+    {"open_files", open_files},
+    {"log_directives", log_directives},
+    {"log_null", log_null},
+    {"log_bytes", log_bytes},
+    {"log_long", log_long},
+    {"log_control", log_control},
+    {"print_control", print_control},
+    {"log_thread", log_thread},
+    {"log_20000", log_20000},
+    {"round_up", round_up},
+    {"flush_to_zero", flush_to_zero},
+    {"fp_traps", fp_traps},
+    {"give_up_files", give_up_files},
+    {"change_folder", change_folder},
+    {"change_locale", change_locale},
+    {"change_umask", change_umask},
+    {"limit_files", limit_files},
+    {"limit_size", limit_size},
+    {"set_alarm", set_alarm},
+    {"block_signals", block_signals},
+    {"change_environment", change_environment},
+    {"ignore_interrupts", ignore_interrupts},
+    {"close_output", close_output},
+    {"truncate_all", truncate_all},
+    {"close_all", close_all},
+    {"fork", fork_},
+    {"daemon", daemon_},
+    {"answer", answer},
+    {"fork_return", fork_return},
+    {"fork_silently", fork_silently},
+    {"fork_program", fork_program},
+    {"thread", thread},
+    {"write_here", write_here},
+    {"attack", attack_all},
+    {"write_temporary", write_temporary},
+    {"tcp", tcp},
+    {"udp", udp},
+    {"processes", processes},
 };
 
 static int misbehave(Fault *fault, Lag *m, const char *function, double time) {
@@ -274,7 +377,9 @@ static int misbehave(Fault *fault, Lag *m, const char *function, double time) {
     if (!fault->what[0] || (!any && strcmp(fault->where, function))) return OK;
     fault->count++;
     int timed = fault->when[0] == '@', each = fault->when[0] == '*';
-    if (timed ? fault->done || time < atof(fault->when + 1) - 1e-9 : !each && fault->count != atol(fault->when)) return OK;
+    if (timed ? fault->done || time < atof(fault->when + 1) - 1e-9
+              : !each && fault->count != atol(fault->when))
+        return OK;
     fault->done = 1;
     for (size_t i = 0; i < sizeof FAULTS / sizeof *FAULTS; i++)
         if (!strcmp(FAULTS[i].name, fault->what)) return FAULTS[i].act(m);
@@ -296,10 +401,12 @@ int enter(Lag *m, const char *function, const char *format, ...) {
     return status;
 }
 
-void record_values(char *line, size_t room, const unsigned *references, size_t count, const double *values) {
+void record_values(char *line, size_t room, const unsigned *references, size_t count,
+                   const double *values) {
     line[0] = 0;
     for (size_t k = 0, used = 0; k < count && used < room; k++)
-        used += snprintf(line + used, room - used, "%s%u=%.17g", k ? " " : "", references[k], values[k]);
+        used += snprintf(line + used, room - used, "%s%u=%.17g", k ? " " : "", references[k],
+                         values[k]);
 }
 
 Lag *new_lag(const char *name) {
@@ -326,7 +433,8 @@ static void read_orders(const char *path) {
     while (file && fgets(line, sizeof line, file)) {
         sscanf(line, "fault %39s %23s %23s", library.where, library.when, library.what);
         sscanf(line, "record %4095[^\n]", record_file);
-        if (attack_count < 100 && sscanf(line, "attack %39s %4095[^\n]", attacks[attack_count].name, attacks[attack_count].target) == 2)
+        if (attack_count < 100 && sscanf(line, "attack %39s %4095[^\n]", attacks[attack_count].name,
+                                         attacks[attack_count].target) == 2)
             attack_count++;
     }
     if (file) fclose(file);

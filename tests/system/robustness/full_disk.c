@@ -1,5 +1,6 @@
-/* A disk that is full after a number of operations: preloaded into a process, it lets those that need space below the folder
- * FULL_DISK fail with ENOSPC from then on. The number of operations left lies in the file FULL_DISK_LEFT, for all processes. */
+/* A disk that is full after a number of operations: preloaded into a process, it lets those that
+ * need space below the folder FULL_DISK fail with ENOSPC from then on. The number of operations
+ * left lies in the file FULL_DISK_LEFT, for all processes. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -62,7 +63,8 @@ int mkdir(const char *path, mode_t mode) {
     return REAL(mkdir)(path, mode);
 }
 
-/* The file of rows is renamed within its folder, which needs no space; others are refused, so that a run ends at each step. */
+/* The file of rows is renamed within its folder, which needs no space; others are refused, so that
+   a run ends at each step. */
 int rename(const char *from, const char *to) {
     const char *name = strrchr(from, '/');
     if ((!name || strcmp(name, "/rows")) && full_at(to)) REFUSE;

@@ -71,6 +71,40 @@ def test_surroundings_do_not_matter_to_the_world(workplace, expected, name):
     assert digest(workplace, "demo1_box", *SURROUNDINGS[name]) == expected["demo1_box"]
 
 
+LARGE_MATRIX = """
+import numpy as np
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+class LargeMatrix(Fmi2Slave):
+    def __init__(self, **arguments):
+        super().__init__(**arguments)
+        self.solution = 0.0
+        self.register_variable(Real("solution", causality=Fmi2Causality.output))
+
+    def do_step(self, current_time, step_size):
+        matrix = np.random.default_rng(1).normal(size=(200, 200))
+        self.solution = float(np.linalg.solve(matrix, matrix[0] + current_time)[0])
+        return True
+"""
+
+
+@pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="needs two processors")
+def test_number_of_processors_does_not_matter(workplace, monkeypatch):
+    """NumPy's BLAS solves large systems in other orders on several processors."""
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    (workplace.folder / "large_matrix.py").write_text(LARGE_MATRIX)
+    components = {"matrix": {"python": "large_matrix.py:LargeMatrix"}}
+    scenario = workplace.scenario(step_size=0.5, components=components)
+    processors = os.sched_getaffinity(0)
+    found = {digest(workplace, str(scenario), {}, ".", ())}
+    os.sched_setaffinity(0, {min(processors)})
+    try:
+        found.add(digest(workplace, str(scenario), {}, ".", ()))
+    finally:
+        os.sched_setaffinity(0, processors)
+    assert len(found) == 1
+
+
 @pytest.mark.long
 def test_twenty_repeats(workplace, expected):
     for _ in range(20):

@@ -1,7 +1,9 @@
-/* Functions of FMI 2.0 for a controller of Real variables, which is included at the end of its C file.
+/* Functions of FMI 2.0 for a controller of Real variables, which is included at the end of its C
+   file.
 
-   The C file defines before: GUID; VARIABLES, the number of variables; FIRST_OUTPUT, the value reference of the first variable
-   that cannot be set; START[VARIABLES], the start values; control(values, step_size), which computes the outputs of a step. */
+   The C file defines before: GUID; VARIABLES, the number of variables; FIRST_OUTPUT, the value
+   reference of the first variable that cannot be set; START[VARIABLES], the start values;
+   control(values, step_size), which computes the outputs of a step. */
 
 #include <stdlib.h>
 #include <string.h>
@@ -15,7 +17,7 @@ typedef struct {
     int initializing;
 } Block;
 
-/* -- life cycle ------------------------------------------------------------------------------------------------------------ */
+/* -- life cycle -------------------------------------------------------------------------------- */
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char *fmi2GetVersion(void) { return fmi2Version; }
@@ -29,7 +31,8 @@ fmi2Status fmi2Reset(fmi2Component c)
 }
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
-                              const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging)
+                              const fmi2CallbackFunctions *callbacks, fmi2Boolean visible,
+                              fmi2Boolean logging)
 {
     if (type != fmi2CoSimulation || strcmp(guid, GUID) != 0) {
         callbacks->logger(callbacks->componentEnvironment, name, fmi2Error, "error",
@@ -43,8 +46,12 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 
 void fmi2FreeInstance(fmi2Component c) { free(c); }
 
-fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean with_tolerance, fmi2Real tolerance, fmi2Real start_time,
-                               fmi2Boolean with_stop_time, fmi2Real stop_time) { return fmi2OK; }
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean with_tolerance, fmi2Real tolerance,
+                               fmi2Real start_time, fmi2Boolean with_stop_time,
+                               fmi2Real stop_time)
+{
+    return fmi2OK;
+}
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
@@ -68,9 +75,10 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step_size, fmi2Bo
 
 fmi2Status fmi2Terminate(fmi2Component c) { return fmi2OK; }
 
-/* -- variables ------------------------------------------------------------------------------------------------------------- */
+/* -- variables --------------------------------------------------------------------------------- */
 
-fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference references[], size_t count, fmi2Real values[])
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference references[], size_t count,
+                       fmi2Real values[])
 {
     for (size_t i = 0; i < count; ++i) {
         if (references[i] >= VARIABLES) return fmi2Error;
@@ -79,7 +87,8 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference references[], s
     return fmi2OK;
 }
 
-fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference references[], size_t count, const fmi2Real values[])
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference references[], size_t count,
+                       const fmi2Real values[])
 {
     Block *block = c;
     for (size_t i = 0; i < count; ++i) {
@@ -90,7 +99,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference references[], s
     return fmi2OK;
 }
 
-/* -- saving and restoring -------------------------------------------------------------------------------------------------- */
+/* -- saving and restoring ---------------------------------------------------------------------- */
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
@@ -113,19 +122,27 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
     return fmi2OK;
 }
 
-/* -- FMI functions without support: other types, serialized states, derivatives, asynchronous steps ------------------------ */
+/* -- FMI functions without support ------------------------------------------------------------ */
 
-#define ONLY_WITHOUT_VARIABLES(TYPE)                                                                                          \
-    fmi2Status fmi2Get##TYPE(fmi2Component c, const fmi2ValueReference references[], size_t count, fmi2##TYPE values[])       \
-    { return count ? fmi2Error : fmi2OK; }                                                                                    \
-    fmi2Status fmi2Set##TYPE(fmi2Component c, const fmi2ValueReference references[], size_t count, const fmi2##TYPE values[]) \
-    { return count ? fmi2Error : fmi2OK; }
+/* other types, serialized states, derivatives, asynchronous steps */
+
+#define ONLY_WITHOUT_VARIABLES(TYPE) \
+    fmi2Status fmi2Get##TYPE(fmi2Component c, const fmi2ValueReference references[], size_t count, \
+                             fmi2##TYPE values[]) { \
+        return count ? fmi2Error : fmi2OK; \
+    } \
+    fmi2Status fmi2Set##TYPE(fmi2Component c, const fmi2ValueReference references[], size_t count, \
+                             const fmi2##TYPE values[]) { \
+        return count ? fmi2Error : fmi2OK; \
+    }
 ONLY_WITHOUT_VARIABLES(Integer)
 ONLY_WITHOUT_VARIABLES(Boolean)
 ONLY_WITHOUT_VARIABLES(String)
 
 #define NO_STATUS(NAME, TYPE) \
-    fmi2Status fmi2Get##NAME(fmi2Component c, const fmi2StatusKind kind, TYPE *value) { return fmi2Discard; }
+    fmi2Status fmi2Get##NAME(fmi2Component c, const fmi2StatusKind kind, TYPE *value) { \
+        return fmi2Discard; \
+    }
 NO_STATUS(Status, fmi2Status)
 NO_STATUS(RealStatus, fmi2Real)
 NO_STATUS(IntegerStatus, fmi2Integer)
@@ -136,12 +153,17 @@ NO_STATUS(StringStatus, fmi2String)
 REFUSED(SerializedFMUstateSize, fmi2FMUstate state, size_t *size)
 REFUSED(SerializeFMUstate, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
 REFUSED(DeSerializeFMUstate, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
-REFUSED(GetDirectionalDerivative, const fmi2ValueReference unknowns[], size_t unknown_count, const fmi2ValueReference knowns[],
-        size_t known_count, const fmi2Real seed[], fmi2Real sensitivity[])
-REFUSED(SetRealInputDerivatives, const fmi2ValueReference references[], size_t count, const fmi2Integer orders[],
-        const fmi2Real values[])
-REFUSED(GetRealOutputDerivatives, const fmi2ValueReference references[], size_t count, const fmi2Integer orders[],
-        fmi2Real values[])
+REFUSED(GetDirectionalDerivative, const fmi2ValueReference unknowns[], size_t unknown_count,
+        const fmi2ValueReference knowns[], size_t known_count, const fmi2Real seed[],
+        fmi2Real sensitivity[])
+REFUSED(SetRealInputDerivatives, const fmi2ValueReference references[], size_t count,
+        const fmi2Integer orders[], const fmi2Real values[])
+REFUSED(GetRealOutputDerivatives, const fmi2ValueReference references[], size_t count,
+        const fmi2Integer orders[], fmi2Real values[])
 
 fmi2Status fmi2CancelStep(fmi2Component c) { return fmi2Error; }
-fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t count, const fmi2String categories[]) { return fmi2OK; }
+fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t count,
+                               const fmi2String categories[])
+{
+    return fmi2OK;
+}

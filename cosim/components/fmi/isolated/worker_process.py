@@ -21,6 +21,7 @@ from ....process.journal import (
     attributing_forks,
     suspending_deadline,
 )
+from ....process.limits import skip_exit_handlers
 from ....process.standard_streams import ForeignOutput
 from ....process.supervisor import POLL_INTERVAL
 from .messages import (
@@ -231,6 +232,7 @@ def _run_worker(
         sys.stderr,
     )  # kept alive, because deleting them would write the importer's buffered output again
     try:
+        skip_exit_handlers()
         commands, answers, output = map(
             _duplicate_above_limit, (commands, answers, output)
         )  # they may be standard streams

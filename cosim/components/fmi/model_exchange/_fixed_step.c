@@ -1,8 +1,10 @@
-/* Explicit integration of a Model Exchange FMU at fixed step size, as a function with the signature of fmi2DoStep.
+/* Explicit integration of a Model Exchange FMU at fixed step size, as a function with the signature
+   of fmi2DoStep.
 
-   The function returns OK at the end of the communication step, and DISCARD after a substep with an event or a failed call; the
-   members `event`, `status` and `failed_function` of the state give the reason. Called again with the same arguments, it
-   continues with the next substep. `advance_in_python` in fixed_step.py makes the same operations in the same order. */
+   The function returns OK at the end of the communication step, and DISCARD after a substep with an
+   event or a failed call; the members `event`, `status` and `failed_function` of the state give the
+   reason. Called again with the same arguments, it continues with the next substep.
+   `advance_in_python` in fixed_step.py makes the same operations in the same order. */
 #define Py_LIMITED_API 0x030b0000
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
@@ -38,24 +40,26 @@ typedef struct {
     int64_t substeps, next_substep, event, status, failed_function;
 } State;
 
-#define CALL(ROLE, EXPRESSION)                                                                                             \
-    do {                                                                                                                   \
-        int status_ = (EXPRESSION);                                                                                        \
-        if (status_ != OK && status_ != WARNING) {                                                                         \
-            s->status = status_;                                                                                           \
-            s->failed_function = ROLE;                                                                                     \
-            return DISCARD;                                                                                                \
-        }                                                                                                                  \
+#define CALL(ROLE, EXPRESSION) \
+    do { \
+        int status_ = (EXPRESSION); \
+        if (status_ != OK && status_ != WARNING) { \
+            s->status = status_; \
+            s->failed_function = ROLE; \
+            return DISCARD; \
+        } \
     } while (0)
 
 /* Set the linear inputs to their values at `time`. */
 static int set_inputs(State *s, double time) {
     size_t references = (size_t)s->reference_count, count = (size_t)s->input_count;
     for (size_t i = 0; i < count; i++)
-        s->input_values[i] = s->input_array[s->input_indices[i]] + s->input_slopes[i] * (time - s->begin);
+        s->input_values[i] =
+            s->input_array[s->input_indices[i]] + s->input_slopes[i] * (time - s->begin);
     if (s->version == 3)
-        CALL(SET_INPUTS, ((int (*)(void *, const uint32_t *, size_t, const double *, size_t))s->set_inputs)(
-                             s->instance, s->input_references, references, s->input_values, count));
+        CALL(SET_INPUTS,
+             ((int (*)(void *, const uint32_t *, size_t, const double *, size_t))s->set_inputs)(
+                 s->instance, s->input_references, references, s->input_values, count));
     else
         CALL(SET_INPUTS, ((int (*)(void *, const uint32_t *, size_t, const double *))s->set_inputs)(
                              s->instance, s->input_references, references, s->input_values));
@@ -68,26 +72,31 @@ static inline int set_time(State *s, double time) {
 }
 
 static inline int set_states(State *s) {
-    if (s->state_count) CALL(SET_STATES, s->set_states(s->instance, s->states, (size_t)s->state_count));
+    if (s->state_count)
+        CALL(SET_STATES, s->set_states(s->instance, s->states, (size_t)s->state_count));
     return OK;
 }
 
 static inline int get_derivatives(State *s) {
-    if (s->state_count) CALL(GET_DERIVATIVES, s->get_derivatives(s->instance, s->derivatives, (size_t)s->state_count));
+    if (s->state_count)
+        CALL(GET_DERIVATIVES,
+             s->get_derivatives(s->instance, s->derivatives, (size_t)s->state_count));
     return OK;
 }
 
 static inline int euler_step(State *s, double end) {
     if (get_derivatives(s)) return DISCARD;
     if (set_time(s, end)) return DISCARD;
-    for (int64_t i = 0; i < s->state_count; i++) s->states[i] += s->substep_size * s->derivatives[i];
+    for (int64_t i = 0; i < s->state_count; i++)
+        s->states[i] += s->substep_size * s->derivatives[i];
     return set_states(s);
 }
 
 /* states = start + weight * derivatives, at `time` */
 static int evaluate_stage(State *s, double time, double weight) {
     if (set_time(s, time)) return DISCARD;
-    for (int64_t i = 0; i < s->state_count; i++) s->states[i] = s->start_states[i] + weight * s->derivatives[i];
+    for (int64_t i = 0; i < s->state_count; i++)
+        s->states[i] = s->start_states[i] + weight * s->derivatives[i];
     if (set_states(s)) return DISCARD;
     return get_derivatives(s);
 }
@@ -108,14 +117,16 @@ static int runge_kutta_step(State *s, double begin, double end) {
     if (evaluate_stage(s, end, s->substep_size)) return DISCARD;
     add_to_sum(s, 1.0);
     double sixth = s->substep_size / 6.0;
-    for (int64_t i = 0; i < s->state_count; i++) s->states[i] = s->start_states[i] + sixth * s->sum[i];
+    for (int64_t i = 0; i < s->state_count; i++)
+        s->states[i] = s->start_states[i] + sixth * s->sum[i];
     return set_states(s);
 }
 
 static int find_state_event(State *s) {
     size_t count = (size_t)s->indicator_count;
     CALL(GET_INDICATORS, s->get_indicators(s->instance, s->indicators, count));
-    for (size_t i = 0; i < count; i++) CALL(GET_INDICATORS, s->indicators[i] == s->indicators[i] ? OK : NOT_A_NUMBER);
+    for (size_t i = 0; i < count; i++)
+        CALL(GET_INDICATORS, s->indicators[i] == s->indicators[i] ? OK : NOT_A_NUMBER);
     for (size_t i = 0; i < count; i++)
         if ((s->previous_indicators[i] <= 0) != (s->indicators[i] <= 0)) s->event |= STATE_EVENT;
     memcpy(s->previous_indicators, s->indicators, count * sizeof(double));
@@ -126,16 +137,18 @@ static inline int complete_step(State *s) {
     bool event, terminate = false;
     if (s->version == 2) {
         int event_needed = 0, ends = 0;
-        CALL(COMPLETE_STEP, ((int (*)(void *, int, int *, int *))s->complete_step)(s->instance, 1, &event_needed, &ends));
+        CALL(COMPLETE_STEP, ((int (*)(void *, int, int *, int *))s->complete_step)(
+                                s->instance, 1, &event_needed, &ends));
         event = event_needed != 0, terminate = ends != 0;
     } else if (s->version == 3) {
         bool event_needed = false, ends = false;
-        CALL(COMPLETE_STEP,
-             ((int (*)(void *, bool, bool *, bool *))s->complete_step)(s->instance, true, &event_needed, &ends));
+        CALL(COMPLETE_STEP, ((int (*)(void *, bool, bool *, bool *))s->complete_step)(
+                                s->instance, true, &event_needed, &ends));
         event = event_needed, terminate = ends;
     } else {
         char event_needed = 0;
-        CALL(COMPLETE_STEP, ((int (*)(void *, char *))s->complete_step)(s->instance, &event_needed));
+        CALL(COMPLETE_STEP,
+             ((int (*)(void *, char *))s->complete_step)(s->instance, &event_needed));
         event = event_needed != 0;
     }
     if (event || terminate) s->event |= (event ? STEP_EVENT : 0) | (terminate ? TERMINATION : 0);
@@ -153,7 +166,8 @@ static int advance(void *state, double time, double step_size, int unused) {
     for (int64_t n = s->next_substep; n < substeps; n++) {
         double end = n + 1 < substeps ? time + (double)(n + 1) * size : time + step_size;
         s->next_substep = n;
-        if (s->stages == 1 ? euler_step(s, end) : runge_kutta_step(s, time + (double)n * size, end)) return DISCARD;
+        if (s->stages == 1 ? euler_step(s, end) : runge_kutta_step(s, time + (double)n * size, end))
+            return DISCARD;
         s->time = end;
         s->next_substep = n + 1;
         if (s->indicator_count && find_state_event(s)) return DISCARD;
@@ -166,8 +180,11 @@ static int advance(void *state, double time, double step_size, int unused) {
 }
 
 static struct PyModuleDef definition = {
-    PyModuleDef_HEAD_INIT, "_fixed_step", "Explicit integration of a Model Exchange FMU at fixed step size.", -1, NULL,
-    NULL, NULL, NULL, NULL};
+    .m_base = PyModuleDef_HEAD_INIT,
+    .m_name = "_fixed_step",
+    .m_doc = "Explicit integration of a Model Exchange FMU at fixed step size.",
+    .m_size = -1,
+};
 
 PyMODINIT_FUNC PyInit__fixed_step(void) {
     PyObject *module = PyModule_Create(&definition);

@@ -35,7 +35,8 @@ _NAME_PATTERN = (
     r"]|\\['\"?\\abfnrtv])+')(?:\[[0-9]+(?:,[0-9]+)*\])?"
 )
 _STRUCTURED_NAME = re.compile(
-    rf"{_NAME_PATTERN}(?:\.{_NAME_PATTERN})*|der\({_NAME_PATTERN}(?:\.{_NAME_PATTERN})*(?:,[0-9]+)?\)"
+    rf"{_NAME_PATTERN}(?:\.{_NAME_PATTERN})*|"
+    rf"der\({_NAME_PATTERN}(?:\.{_NAME_PATTERN})*(?:,[0-9]+)?\)"
 )
 #: largest number of names that are compared for a spelling hint, which is slow
 _MAX_HINT_CANDIDATES = 200

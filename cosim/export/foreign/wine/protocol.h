@@ -1,8 +1,10 @@
-/* Messages between the proxy library, which the importer loads, and the worker, which runs the FMU's DLL under Wine.
+/* Messages between the proxy library, which the importer loads, and the worker, which runs the
+   FMU's DLL under Wine.
 
-   The proxy writes a request to the worker's standard input, the worker writes a reply to its standard output. A request is a
-   `Request`, its `Argument`s, and the data of the arguments that have some. A reply is a `Reply`, the data of arguments that
-   return some, and records of log messages: a `LogRecord` and its text. All data begin at multiples of 8 bytes. */
+   The proxy writes a request to the worker's standard input, the worker writes a reply to its
+   standard output. A request is a `Request`, its `Argument`s, and the data of the arguments that
+   have some. A reply is a `Reply`, the data of arguments that return some, and records of log
+   messages: a `LogRecord` and its text. All data begin at multiples of 8 bytes. */
 #ifndef PROTOCOL_H
 #define PROTOCOL_H
 #include <stdbool.h>
@@ -19,9 +21,12 @@ enum {
     DATA_OUT,      /* memory that the function writes */
     DATA_INOUT,    /* both */
     STRINGS_IN,    /* array of texts, sent one after the other with their null bytes */
-    STRINGS_OUT,   /* array of `count` texts: in the reply, sizes (8 bytes each) and contents with a null byte each */
+    /* array of `count` texts: in the reply, sizes (8 bytes each) and contents with a null byte
+       each */
+    STRINGS_OUT,
     BINARIES_IN,   /* array of pointers: the data are sizes and contents */
-    BINARIES_OUT,  /* array of pointers, whose sizes are in the argument before: contents in the reply */
+    /* array of pointers, whose sizes are in the argument before: contents in the reply */
+    BINARIES_OUT,
     CALLBACKS,     /* callback functions of FMI 1.0 or 2.0; value: the componentEnvironment */
     LOG_FUNCTION,  /* fmi3LogMessageCallback */
 };
@@ -35,7 +40,8 @@ typedef struct {
     char function[MAX_NAME];
 } Request;
 
-/* `failed`: the function does not exist or raised an exception; the only log record gives the reason. */
+/* `failed`: the function does not exist or raised an exception; the only log record gives the
+   reason. */
 typedef struct {
     uint64_t size, result, failed, log_count;
 } Reply;

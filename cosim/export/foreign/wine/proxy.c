@@ -1,8 +1,9 @@
-/* Library with the functions of FMI 1.0, 2.0 or 3.0 (macro FMI), which forwards them to the worker under Wine (protocol.h).
+/* Library with the functions of FMI 1.0, 2.0 or 3.0 (macro FMI), which forwards them to the worker
+   under Wine (protocol.h).
 
-   Macros: FMI, PREFIX (of the function names), WINE (program), WINE_FOLDER (its WINEPREFIX), WORKER and DLL (files, relative to
-   the folder of this library). One process of the worker serves all instances of the library; it ends when the library is
-   unloaded or the importer ends. */
+   Macros: FMI, PREFIX (of the function names), WINE (program), WINE_FOLDER (its WINEPREFIX), WORKER
+   and DLL (files, relative to the folder of this library). One process of the worker serves all
+   instances of the library; it ends when the library is unloaded or the importer ends. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -39,7 +40,7 @@ enum { FMI_OK = 0, FMI_ERROR = 3, FMI_FATAL = 4 };
 #define TEXT(A) TEXT_(A)
 #define F(NAME) JOIN(PREFIX, NAME)
 
-/* -- log ------------------------------------------------------------------------------------------------------------------- */
+/* -- log --------------------------------------------------------------------------------------- */
 
 /* Each instance has a key, which is its componentEnvironment in the worker. */
 typedef struct Instance {
@@ -61,16 +62,18 @@ static void emit(Instance *instance, int status, const char *text) {
     const char *category = status >= FMI_ERROR ? "logStatusError" : "logAll";
     if (instance->log) instance->log(instance->environment, status, category, text);
     else if (instance->logger)
-        instance->logger(FMI == 1 ? instance->handle : instance->environment, instance->name, status, category, "%s", text);
+        instance->logger(FMI == 1 ? instance->handle : instance->environment, instance->name,
+                         status, category, "%s", text);
 }
 
 static void emit_record(const LogRecord *record, const char *text) {
     Instance *instance = instances;
-    while (instance && (instance->key != record->environment || FMI == 1)) instance = instance->next;
+    while (instance && (instance->key != record->environment || FMI == 1))
+        instance = instance->next;
     emit(instance ? instance : current, (int)record->status, text);
 }
 
-/* -- worker ---------------------------------------------------------------------------------------------------------------- */
+/* -- worker ------------------------------------------------------------------------------------ */
 
 static pid_t process;
 static int to_worker = -1, from_worker = -1;
@@ -126,9 +129,11 @@ static bool lose(const char *format, ...) {
 
 /* Receive a reply after the data of `memory`; true if the function was called. */
 static bool receive(Reply *reply, const char *function) {
-    if (!transfer(false, reply, sizeof *reply)) return lose("the Windows process ended in %s", function);
+    if (!transfer(false, reply, sizeof *reply))
+        return lose("the Windows process ended in %s", function);
     reserve(reply->size + 1);
-    if (!transfer(false, memory, reply->size)) return lose("the Windows process ended in %s", function);
+    if (!transfer(false, memory, reply->size))
+        return lose("the Windows process ended in %s", function);
     if (!reply->failed) return true;
     LogRecord *record = (LogRecord *)memory;
     char text[600];
@@ -151,7 +156,8 @@ static char **worker_environment(void) {
 static bool start(void) {
     Dl_info info;
     char folder[PATH_MAX], worker[PATH_MAX + 64], library[PATH_MAX + 256];
-    if (!dladdr((void *)start, &info) || !realpath(info.dli_fname, folder)) return lose("the library has no path");
+    if (!dladdr((void *)start, &info) || !realpath(info.dli_fname, folder))
+        return lose("the library has no path");
     *strrchr(folder, '/') = 0;
     snprintf(worker, sizeof worker, "Z:%s/" WORKER, folder);
     snprintf(library, sizeof library, "Z:%s/" DLL, folder);
@@ -177,7 +183,7 @@ static bool start(void) {
     return receive(&reply, "start");
 }
 
-/* -- calls ----------------------------------------------------------------------------------------------------------------- */
+/* -- calls ------------------------------------------------------------------------------------- */
 
 typedef struct {
     Argument a;
@@ -193,7 +199,9 @@ static Parameter real(double value) {
 static Parameter block(int kind, const void *data, size_t size, size_t count) {
     return data ? (Parameter){{(uint64_t)kind, 0, size, count}, (void *)data} : number(0);
 }
-static Parameter text(String value) { return block(DATA_IN, value, value ? strlen(value) + 1 : 0, 1); }
+static Parameter text(String value) {
+    return block(DATA_IN, value, value ? strlen(value) + 1 : 0, 1);
+}
 static Parameter strings(const String values[], size_t count) {
     size_t size = 0;
     for (size_t i = 0; i < count; i++) size += strlen(values[i] ? values[i] : "") + 1;
@@ -237,7 +245,8 @@ static char *read_data(char *from, const Parameter *p) {
         memcpy(p->memory, from, p->a.size);
         return from + aligned(p->a.size);
     }
-    for (uint64_t i = 0; i < p->a.count && (p->a.kind == STRINGS_OUT || p->a.kind == BINARIES_OUT); i++) {
+    for (uint64_t i = 0; i < p->a.count && (p->a.kind == STRINGS_OUT || p->a.kind == BINARIES_OUT);
+         i++) {
         uint64_t size = *(uint64_t *)from;
         from += sizeof size;
         ((char **)p->memory)[i] = size == UINT64_MAX ? NULL : from;
@@ -251,16 +260,19 @@ static uint64_t forward(const char *name, const Parameter *p, size_t count) {
     snprintf(request.function, sizeof request.function, "%s", name);
     size_t size = count * sizeof(Argument);
     for (size_t i = 0; i < count; i++)
-        if (p[i].a.kind == DATA_IN || p[i].a.kind == DATA_INOUT || p[i].a.kind == STRINGS_IN || p[i].a.kind == BINARIES_IN)
+        if (p[i].a.kind == DATA_IN || p[i].a.kind == DATA_INOUT || p[i].a.kind == STRINGS_IN ||
+            p[i].a.kind == BINARIES_IN)
             size += aligned(p[i].a.size);
     request.size = size;
     reserve(sizeof request + size);
     memcpy(memory, &request, sizeof request);
     char *at = memory + sizeof request;
-    for (size_t i = 0; i < count; i++, at += sizeof(Argument)) memcpy(at, &p[i].a, sizeof(Argument));
+    for (size_t i = 0; i < count; i++, at += sizeof(Argument))
+        memcpy(at, &p[i].a, sizeof(Argument));
     for (size_t i = 0; i < count; i++) at = write_data(at, &p[i]);
     Reply reply;
-    if (!transfer(true, memory, sizeof request + size)) return lose("the Windows process ended in %s", name), FMI_FATAL;
+    if (!transfer(true, memory, sizeof request + size))
+        return lose("the Windows process ended in %s", name), FMI_FATAL;
     if (!receive(&reply, name)) return FMI_FATAL;
     at = memory;
     for (size_t i = 0; i < count; i++) at = read_data(at, &p[i]);
@@ -281,7 +293,8 @@ static uint64_t call(const char *name, const Parameter *p) {
     while (p[count].a.kind != END) count++;
     pthread_mutex_lock(&mutex);
     if (p[0].a.kind == VALUE && p[0].a.value)
-        for (current = instances; current && (uint64_t)(uintptr_t)current->handle != p[0].a.value;) current = current->next;
+        for (current = instances; current && (uint64_t)(uintptr_t)current->handle != p[0].a.value;)
+            current = current->next;
     uint64_t result = is_lost ? FMI_FATAL : forward(name, p, count);
     pthread_mutex_unlock(&mutex);
     return result;
@@ -315,13 +328,15 @@ static void forget(Handle handle) {
         }
 }
 
-/* Return a path or a file URI as Windows programs expect it under Wine; the result is overwritten by the next call. */
+/* Return a path or a file URI as Windows programs expect it under Wine; the result is overwritten
+   by the next call. */
 static String windows_path(String path) {
     static char result[PATH_MAX + 64];
     if (!path) return NULL;
     const char *slash = strncmp(path, "file://", 7) ? path : path + 7;
     bool is_uri = slash != path;
-    snprintf(result, sizeof result, "%.*s%sZ:%s", (int)(slash - path), path, is_uri ? "/" : "", slash);
+    snprintf(result, sizeof result, "%.*s%sZ:%s", (int)(slash - path), path, is_uri ? "/" : "",
+             slash);
     for (char *p = result; *p && !is_uri; p++)
         if (*p == '/') *p = '\\';
     return result;

@@ -1,8 +1,9 @@
-/* Program for Windows that loads the DLL of an FMU and calls its functions for the proxy library (see protocol.h).
+/* Program for Windows that loads the DLL of an FMU and calls its functions for the proxy library
+   (see protocol.h).
 
-   All FMI functions are called through one function type. In the calling convention of x64 Windows, a variadic call passes
-   floating-point arguments in both kinds of registers, so that the callee finds numbers and pointers where it expects them.
-   Structures are passed by their addresses. */
+   All FMI functions are called through one function type. In the calling convention of x64 Windows,
+   a variadic call passes floating-point arguments in both kinds of registers, so that the callee
+   finds numbers and pointers where it expects them. Structures are passed by their addresses. */
 #include <fcntl.h>
 #include <io.h>
 #include <stdarg.h>
@@ -39,7 +40,8 @@ static void append(Buffer *b, const void *data, size_t size) {
 static bool transfer(bool writes, char *data, uint64_t size) {
     while (size) {
         DWORD part = size > 1 << 20 ? 1 << 20 : (DWORD)size, done = 0;
-        BOOL ok = writes ? WriteFile(output, data, part, &done, NULL) : ReadFile(input, data, part, &done, NULL);
+        BOOL ok = writes ? WriteFile(output, data, part, &done, NULL)
+                         : ReadFile(input, data, part, &done, NULL);
         if (!ok || !done) return false;
         data += done;
         size -= done;
@@ -75,18 +77,20 @@ static void fail(const char *format, ...) {
 
 static LONG WINAPI report_exception(EXCEPTION_POINTERS *pointers) {
     DWORD code = pointers->ExceptionRecord->ExceptionCode;
-    fail("exception 0x%08lX%s in the Windows library", code, code == EXCEPTION_ACCESS_VIOLATION ? " (access violation)" : "");
+    fail("exception 0x%08lX%s in the Windows library", code,
+         code == EXCEPTION_ACCESS_VIOLATION ? " (access violation)" : "");
     TerminateProcess(GetCurrentProcess(), 1);
     return EXCEPTION_EXECUTE_HANDLER;
 }
 
-/* -- callback functions of the FMU ------------------------------------------------------------------------------------- */
+/* -- callback functions of the FMU ------------------------------------------------------------- */
 
 static void *allocate(size_t count, size_t size) { return calloc(count, size); }
 static void release(void *memory) { free(memory); }
 static void step_finished(void *instance, int status) {}
 
-static void log_formatted(void *environment, const char *instance, int status, const char *category, const char *format, ...) {
+static void log_formatted(void *environment, const char *instance, int status, const char *category,
+                          const char *format, ...) {
     char text[8192];
     va_list arguments;
     va_start(arguments, format);
@@ -108,17 +112,22 @@ typedef struct {
 } Callbacks;
 
 static Callbacks *make_callbacks(uint64_t environment) {
-    Callbacks *callbacks = malloc(sizeof *callbacks); /* FMI 2.0 may keep the pointer: never freed */
-    *callbacks = (Callbacks){log_formatted, allocate, release, step_finished, (void *)(uintptr_t)environment};
+    /* FMI 2.0 may keep the pointer: never freed */
+    Callbacks *callbacks = malloc(sizeof *callbacks);
+    *callbacks = (Callbacks){log_formatted, allocate, release, step_finished,
+                             (void *)(uintptr_t)environment};
     return callbacks;
 }
 
-/* -- calls --------------------------------------------------------------------------------------------------------------- */
+/* -- calls ------------------------------------------------------------------------------------- */
 
-/* Return the argument that the function receives, and advance `data` behind the data of the request. */
+/* Return the argument that the function receives, and advance `data` behind the data of the
+   request. */
 static uint64_t unpack(const Argument *a, char **data) {
     char *own = *data;
-    if (a->kind == DATA_IN || a->kind == DATA_INOUT || a->kind == STRINGS_IN || a->kind == BINARIES_IN) *data += aligned(a->size);
+    if (a->kind == DATA_IN || a->kind == DATA_INOUT || a->kind == STRINGS_IN ||
+        a->kind == BINARIES_IN)
+        *data += aligned(a->size);
     switch (a->kind) {
     case VALUE: return a->value;
     case CALLBACKS: return (uint64_t)(uintptr_t)make_callbacks(a->value);
@@ -142,7 +151,9 @@ static void pack(const Argument *a, uint64_t value, const size_t *sizes_before) 
     if (a->kind == DATA_OUT || a->kind == DATA_INOUT) append(&reply, pointers, a->size);
     if (a->kind == STRINGS_OUT || a->kind == BINARIES_OUT)
         for (uint64_t i = 0; i < a->count; i++) {
-            uint64_t size = !pointers[i] ? 0 : a->kind == STRINGS_OUT ? strlen(pointers[i]) + 1 : sizes_before[i];
+            uint64_t size = !pointers[i]             ? 0
+                            : a->kind == STRINGS_OUT ? strlen(pointers[i]) + 1
+                                                     : sizes_before[i];
             uint64_t known = pointers[i] || a->kind == BINARIES_OUT ? size : UINT64_MAX;
             append(&reply, &known, sizeof known);
             append(&reply, size ? pointers[i] : "", size);
@@ -161,9 +172,10 @@ static void execute(const Argument arguments[], size_t count, char *data) {
     for (size_t i = 0; i < count; i++) v[i] = unpack(&arguments[i], &data);
     memcpy(d, v, sizeof d);
     uint64_t (*call)(void *, ...) = (uint64_t(*)(void *, ...))function;
-    uint64_t result = call((void *)(uintptr_t)v[0], d[1], d[2], d[3], v[4], v[5], v[6], v[7], v[8], v[9], v[10], v[11], v[12],
-                           v[13], v[14], v[15]);
-    for (size_t i = 0; i < count; i++) pack(&arguments[i], v[i], i ? (const size_t *)(uintptr_t)v[i - 1] : NULL);
+    uint64_t result = call((void *)(uintptr_t)v[0], d[1], d[2], d[3], v[4], v[5], v[6], v[7], v[8],
+                           v[9], v[10], v[11], v[12], v[13], v[14], v[15]);
+    for (size_t i = 0; i < count; i++)
+        pack(&arguments[i], v[i], i ? (const size_t *)(uintptr_t)v[i - 1] : NULL);
     for (size_t i = 0; i < count; i++)
         if (arguments[i].kind == DATA_OUT) free((void *)(uintptr_t)v[i]);
     send_reply(result, false);
@@ -174,8 +186,10 @@ int main(int argc, char **argv) {
     SetErrorMode(SEM_FAILCRITICALERRORS | SEM_NOGPFAULTERRORBOX | SEM_NOOPENFILEERRORBOX);
     SetUnhandledExceptionFilter(report_exception);
     HANDLE self = GetCurrentProcess();
-    DuplicateHandle(self, GetStdHandle(STD_INPUT_HANDLE), self, &input, 0, FALSE, DUPLICATE_SAME_ACCESS);
-    DuplicateHandle(self, GetStdHandle(STD_OUTPUT_HANDLE), self, &output, 0, FALSE, DUPLICATE_SAME_ACCESS);
+    DuplicateHandle(self, GetStdHandle(STD_INPUT_HANDLE), self, &input, 0, FALSE,
+                    DUPLICATE_SAME_ACCESS);
+    DuplicateHandle(self, GetStdHandle(STD_OUTPUT_HANDLE), self, &output, 0, FALSE,
+                    DUPLICATE_SAME_ACCESS);
     _dup2(2, 1); /* what the FMU prints must not get between the replies */
     SetStdHandle(STD_OUTPUT_HANDLE, GetStdHandle(STD_ERROR_HANDLE));
     library = LoadLibraryExA(argv[1], NULL, LOAD_WITH_ALTERED_SEARCH_PATH);
@@ -194,9 +208,11 @@ int main(int argc, char **argv) {
     while (transfer(false, (char *)&head, sizeof head)) {
         request.size = 0;
         reserve(&request, head.size);
-        if (!transfer(false, request.data, head.size) || head.argument_count > MAX_ARGUMENTS) return 1;
+        if (!transfer(false, request.data, head.size) || head.argument_count > MAX_ARGUMENTS)
+            return 1;
         memcpy(function_name, head.function, sizeof function_name);
-        execute((Argument *)request.data, head.argument_count, request.data + head.argument_count * sizeof(Argument));
+        execute((Argument *)request.data, head.argument_count,
+                request.data + head.argument_count * sizeof(Argument));
     }
     return 0;
 }

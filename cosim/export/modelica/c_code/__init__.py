@@ -1,7 +1,5 @@
 """Code generation: a flat model with its schedule is lowered to C code."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path

@@ -3,8 +3,6 @@
 Identifiers, types, operator precedence and element access of arrays.
 """
 
-from __future__ import annotations
-
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Iterator

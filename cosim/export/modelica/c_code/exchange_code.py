@@ -3,8 +3,6 @@
 Addresses of the states, evaluation between events, and events.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 from ..model.flat_model import Model, Relation, is_integrated

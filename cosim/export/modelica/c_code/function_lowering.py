@@ -100,7 +100,9 @@ class FunctionTranslator:
         ]
         outputs = [self._declare(lowering, local, None, where) for local in function.outputs]
         local_values = [self._declare(lowering, local, None, where) for local in function.locals]
-        self._initialize_variables(lowering, (*function.outputs, *function.locals))
+        for local in (*function.outputs, *function.locals):
+            if local.default is not None:
+                lowering.store(lowering.scope[local.name], local.default, Name(local.name))
         lowering.body(function.body)
         instance = FunctionInstance(
             self._name(function.name),
@@ -146,13 +148,6 @@ class FunctionTranslator:
         value = variable_value(local.type, actual, c_identifier(local.name.replace(".", "__")))
         lowering.scope[local.name] = value
         return value
-
-    def _initialize_variables(
-        self, lowering: StatementLowering, variables: tuple[FunctionVariable, ...]
-    ) -> None:
-        for local in variables:
-            if local.default is not None:
-                lowering.store(lowering.scope[local.name], local.default, Name(local.name))
 
     def _name(self, name: str) -> str:
         base = c_identifier(name) if "." in name else c_identifier(name) + "_"
@@ -242,7 +237,9 @@ def _opening_lines(
 ) -> list[str]:
     """Return the declarations, and `(void)` statements for unused variables."""
     lines = [
-        _declaration(output) if instance.returns_scalar or not output.shape else _zero_fill(output)
+        _declaration(output)
+        if instance.returns_scalar or not output.shape
+        else f"memset({output.pointer}, 0, {output.size} * sizeof *{output.pointer});"
         for output in instance.outputs
     ]
     used = [
@@ -280,10 +277,6 @@ def _c_name(value: CValue) -> str:
 def _parameter(value: CValue, qualifier: str) -> str:
     size = f"[{max(value.size, 1)}]" if value.shape else ""
     return f"{qualifier if value.shape else ''}{C_TYPES[value.type]} {_c_name(value)}{size}"
-
-
-def _zero_fill(value: CValue) -> str:
-    return f"memset({value.pointer}, 0, {value.size} * sizeof *{value.pointer});"
 
 
 def _declaration(value: CValue) -> str:

@@ -1,7 +1,5 @@
 """Code generation of model.h: the struct with one member for each variable of the model."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any

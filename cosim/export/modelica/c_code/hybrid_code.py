@@ -3,8 +3,6 @@
 The functions that hybrid.h and the communication step call.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -18,7 +18,8 @@ static inline void fail_with(Model *m, const char *format, ...)
     m->failure = COMPOSED_REASON;
 }
 
-/* Stores a warning if its condition was not violated before; several warnings are separated by "; ". */
+/* Stores a warning if its condition was not violated before; several warnings are separated
+   by "; ". */
 static inline void warn(Model *m, bool violated, bool *before, const char *format, ...)
 {
     const size_t length = strlen(m->warning);
@@ -26,7 +27,8 @@ static inline void warn(Model *m, bool violated, bool *before, const char *forma
         va_list arguments;
         va_start(arguments, format);
         snprintf(m->warning + length, sizeof m->warning - length, "%s", length > 0 ? "; " : "");
-        vsnprintf(m->warning + strlen(m->warning), sizeof m->warning - strlen(m->warning), format, arguments);
+        vsnprintf(m->warning + strlen(m->warning), sizeof m->warning - strlen(m->warning), format,
+                  arguments);
         va_end(arguments);
     }
     *before = violated;
@@ -41,7 +43,8 @@ static inline void request_termination(Model *m, const char *format, ...)
     if (m->terminated) return;
     va_start(arguments, format);
     snprintf(m->warning + length, sizeof m->warning - length, "%s", length > 0 ? "; " : "");
-    vsnprintf(m->warning + strlen(m->warning), sizeof m->warning - strlen(m->warning), format, arguments);
+    vsnprintf(m->warning + strlen(m->warning), sizeof m->warning - strlen(m->warning), format,
+              arguments);
     va_end(arguments);
     m->terminated = true;
 }

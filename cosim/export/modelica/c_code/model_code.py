@@ -1,7 +1,5 @@
 """Code generation of model.c: readable C code of a flat model."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Code generation of model_step: events in a communication step, and integration between them."""
 
-from __future__ import annotations
-
 from ..causality.hybrid import (
     MAX_EVENTS,
 )

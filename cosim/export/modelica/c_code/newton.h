@@ -14,7 +14,8 @@ typedef struct {
     double fraction, merit;
 } NewtonSearch;
 
-/* Solves a linear system by elimination with row pivoting; the solution replaces b. Returns false if the matrix is singular. */
+/* Solves a linear system by elimination with row pivoting; the solution replaces b. Returns false
+   if the matrix is singular. */
 static inline bool eliminate(int n, double *a, double *b)
 {
     for (int column = 0; column < n; column++) {
@@ -54,24 +55,28 @@ static inline double largest_ratio(int n, const double *residual, const double *
     return largest;
 }
 
-/* Executes one iteration; returns true if it is the last one: the change is small, or the iteration has failed.
-   A step that increases the scaled residual is halved. The scale of a residual is the sum of its terms |derivative| (1 + |unknown|). */
-static inline bool newton(Model *m, int n, double *const *unknown, double *residual, double *jacobian, double *step, double *scale,
-                          NewtonSearch *search, int iteration, int32_t reason)
+/* Executes one iteration; returns true if it is the last one: the change is small, or the iteration
+   has failed. A step that increases the scaled residual is halved. The scale of a residual is the
+   sum of its terms |derivative| (1 + |unknown|). */
+static inline bool newton(Model *m, int n, double *const *unknown, double *residual,
+                          double *jacobian, double *step, double *scale, NewtonSearch *search,
+                          int iteration, int32_t reason)
 {
     if (iteration) {
         const double merit = largest_ratio(n, residual, scale);
         if (!(merit <= search->merit || merit <= RESIDUAL_ROUNDING)) {
             search->fraction /= 2;
             for (int k = 0; k < n; k++) *unknown[k] += search->fraction * step[k];
-            if (search->fraction > SMALLEST_FRACTION && iteration + 1 < NEWTON_ITERATIONS) return false;
+            if (search->fraction > SMALLEST_FRACTION && iteration + 1 < NEWTON_ITERATIONS)
+                return false;
             fail(m, reason);
             return true;
         }
     }
     for (int row = 0; row < n; row++) {
         scale[row] = 0;
-        for (int k = 0; k < n; k++) scale[row] += fabs(jacobian[row * n + k]) * (1 + fabs(*unknown[k]));
+        for (int k = 0; k < n; k++)
+            scale[row] += fabs(jacobian[row * n + k]) * (1 + fabs(*unknown[k]));
     }
     search->merit = largest_ratio(n, residual, scale);
     search->fraction = 1;

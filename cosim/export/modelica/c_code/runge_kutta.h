@@ -1,4 +1,5 @@
-/* Integration of continuous states: the classical Runge-Kutta method of order 4 in equal steps of at most 5 ms. */
+/* Integration of continuous states: the classical Runge-Kutta method of order 4 in equal steps of
+   at most 5 ms. */
 #ifndef RUNGE_KUTTA_H
 #define RUNGE_KUTTA_H
 
@@ -6,7 +7,8 @@
 
 #define LONGEST_STEP 0.005
 
-/* Pointers to the states of a model and to their derivatives, and the function that computes the derivatives. */
+/* Pointers to the states of a model and to their derivatives, and the function that computes the
+   derivatives. */
 typedef struct {
     double *x[STATES];
     const double *dx[STATES];

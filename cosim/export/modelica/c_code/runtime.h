@@ -1,4 +1,5 @@
-/* Runtime functions of compiled Modelica models: Integer arithmetic with overflow checks, and clocks. */
+/* Runtime functions of compiled Modelica models: Integer arithmetic with overflow checks, and
+   clocks. */
 #ifndef RUNTIME_H
 #define RUNTIME_H
 
@@ -8,7 +9,13 @@
 #include <stddef.h>
 #include <string.h>
 
-enum { OVERFLOW_OF_INTEGER = 1, DIVISION_BY_ZERO = 2, PERIOD_NOT_POSITIVE = 3, STEP_SIZE_TOO_SMALL = 4, COMPOSED_REASON = 0x7fffffff };
+enum {
+    OVERFLOW_OF_INTEGER = 1,
+    DIVISION_BY_ZERO = 2,
+    PERIOD_NOT_POSITIVE = 3,
+    STEP_SIZE_TOO_SMALL = 4,
+    COMPOSED_REASON = 0x7fffffff
+};
 
 /* Records a failure; the first one is reported. */
 static inline void fail(Model *m, int32_t reason)
@@ -32,8 +39,14 @@ static inline int32_t integer(Model *m, int64_t value)
 }
 
 static inline int32_t add(Model *m, int32_t a, int32_t b) { return integer(m, (int64_t)a + b); }
-static inline int32_t subtract(Model *m, int32_t a, int32_t b) { return integer(m, (int64_t)a - b); }
-static inline int32_t multiply(Model *m, int32_t a, int32_t b) { return integer(m, (int64_t)a * b); }
+static inline int32_t subtract(Model *m, int32_t a, int32_t b)
+{
+    return integer(m, (int64_t)a - b);
+}
+static inline int32_t multiply(Model *m, int32_t a, int32_t b)
+{
+    return integer(m, (int64_t)a * b);
+}
 static inline int32_t absolute(Model *m, int32_t a) { return a < 0 ? subtract(m, 0, a) : a; }
 
 /* div(a, b): the quotient, rounded toward zero. */
@@ -45,7 +58,10 @@ static inline int32_t divide(Model *m, int32_t a, int32_t b)
 }
 
 /* rem(a, b) has the sign of a, mod(a, b) that of b. */
-static inline int32_t remainder_of(Model *m, int32_t a, int32_t b) { return b == -1 ? 0 : a - b * divide(m, a, b); }
+static inline int32_t remainder_of(Model *m, int32_t a, int32_t b)
+{
+    return b == -1 ? 0 : a - b * divide(m, a, b);
+}
 static inline int32_t modulo(Model *m, int32_t a, int32_t b)
 {
     const int32_t r = remainder_of(m, a, b);
@@ -71,7 +87,8 @@ static inline double real_quotient(double a, double b) { return trunc(a / b); }
 static inline double real_remainder(double a, double b) { return a - trunc(a / b) * b; }
 static inline double real_modulo(double a, double b) { return a - floor(a / b) * b; }
 
-/* Tolerance for comparing the times of ticks and communication points, as a fraction of the period. */
+/* Tolerance for comparing the times of ticks and communication points, as a fraction of the
+   period. */
 #define TOLERANCE 1e-6
 
 static inline double next_tick(const Clock *c) { return c->start + (double)c->ticks * c->period; }
@@ -96,7 +113,8 @@ static inline double next_event(const Clock *clocks, int count, bool *due)
 {
     double now = next_tick(&clocks[0]);
     for (int k = 1; k < count; k++) now = smaller(next_tick(&clocks[k]), now);
-    for (int k = 0; k < count; k++) due[k] = next_tick(&clocks[k]) <= now + TOLERANCE * clocks[k].period;
+    for (int k = 0; k < count; k++)
+        due[k] = next_tick(&clocks[k]) <= now + TOLERANCE * clocks[k].period;
     return now;
 }
 

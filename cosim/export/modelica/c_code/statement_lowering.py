@@ -1,7 +1,5 @@
 """Lowering of Modelica statements to C."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -85,18 +83,17 @@ class StatementLowering(ExpressionLowering):
         ):
             self.lower_call(value, target.pointer)
         else:
-            self._store_value(target, value, reference)
-
-    def _store_value(self, target: CValue, value: Expression, reference: Expression) -> None:
-        lowered = self.lower(value)
-        if lowered.shape not in ((), target.shape):
-            sizes = f"found size {list(lowered.shape)}, expected {list(target.shape)}"
-            raise_model_error(f"assignment of an array: {sizes}", getattr(reference, "where", None))
-        if lowered.shape != target.shape:
-            lowered = replace(self.evaluated_once(lowered), shape=target.shape)
-        if target.shape and _variables_read(value) & variable_names(reference):
-            lowered = self.evaluated_once(replace(lowered, reusable=False))
-        self.copy_elements(target, lowered)
+            lowered = self.lower(value)
+            if lowered.shape not in ((), target.shape):
+                sizes = f"found size {list(lowered.shape)}, expected {list(target.shape)}"
+                raise_model_error(
+                    f"assignment of an array: {sizes}", getattr(reference, "where", None)
+                )
+            if lowered.shape != target.shape:
+                lowered = replace(self.evaluated_once(lowered), shape=target.shape)
+            if target.shape and _variables_read(value) & variable_names(reference):
+                lowered = self.evaluated_once(replace(lowered, reusable=False))
+            self.copy_elements(target, lowered)
 
     def _can_return_into(self, value: Call, target: CValue) -> bool:
         """Return whether a function can write its result to the target without a copy."""
@@ -136,7 +133,8 @@ class StatementLowering(ExpressionLowering):
         `else { if ... }` is shortened to `else if` where possible.
         """
         self.lines += yes
-        if no and _is_one_if(no):
+        is_one_if = no and no[0].startswith("    if (") and no[0].endswith("{")
+        if is_one_if and no.index("    }") == len(no) - 1:
             self.lines += ["} else " + no[0].strip(), *(line[4:] for line in no[1:])]
         elif no:
             self.lines += ["} else {", *no, "}"]
@@ -302,12 +300,3 @@ class StatementLowering(ExpressionLowering):
 def _variables_read(node: Expression) -> set[str]:
     """Return the variables whose current value an expression reads."""
     return {referenced_variable(reference) for reference in read_references(node)}
-
-
-def _is_one_if(lines: list[str]) -> bool:
-    """Return whether the lines are one if-statement."""
-    return (
-        lines[0].startswith("    if (")
-        and lines[0].endswith("{")
-        and lines.index("    }") == len(lines) - 1
-    )

@@ -1,7 +1,5 @@
 """Result of the analysis of a model: schedule, roles of parameters, default values."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
@@ -41,11 +39,19 @@ def classify_parameters(model: Model, schedule: Schedule) -> ParameterRoles:
     """
     parameters = [v for v in model.variables.values() if v.variability in ("parameter", "constant")]
     dependencies = {v.name: _dependencies(v) for v in parameters}
-    _check_dependencies(model, dependencies)
+    for name, others in dependencies.items():
+        if invalid := [other for other in others if other not in dependencies]:
+            raise_model_error(
+                f"the parameter {name} depends on {invalid[0]}, which is not a parameter",
+                model.variables[name].where,
+            )
     settable = [
         v.name
         for v in parameters
-        if v.variability == "parameter" and not dependencies[v.name] and _is_open(v, model)
+        if v.variability == "parameter"
+        and not dependencies[v.name]
+        and v.type != "ExternalObject"
+        and not (v.final or v.protected or v.name in model.structural)
     ]
     try:
         order = TopologicalSorter(dependencies).static_order()
@@ -76,29 +82,10 @@ def _dependencies(parameter: Variable) -> list[str]:
     return sorted(variable_names(value))
 
 
-def _check_dependencies(model: Model, dependencies: dict[str, list[str]]) -> None:
-    for name, others in dependencies.items():
-        if invalid := [other for other in others if other not in dependencies]:
-            raise_model_error(
-                f"the parameter {name} depends on {invalid[0]}, which is not a parameter",
-                model.variables[name].where,
-            )
-
-
 def _transitive_dependencies(name: str, dependencies: dict[str, list[str]]) -> Iterator[str]:
     yield name
     for other in dependencies.get(name, ()):
         yield from _transitive_dependencies(other, dependencies)
-
-
-def _is_open(parameter: Variable, model: Model) -> bool:
-    """Return whether the importer may set a parameter."""
-    return not (
-        parameter.type == "ExternalObject"
-        or parameter.final
-        or parameter.protected
-        or parameter.name in model.structural
-    )
 
 
 class AnalysedModel:

@@ -130,7 +130,9 @@ class ClockInference:
         for node, item in self.items():
             self._collect(node, item, getattr(item, "where", None))
         self._rates = self._solve()
-        self._refuse_continuous()
+        for node, name, where in self._continuous:
+            if self.rate(node):
+                raise_model_error(f"{name} belongs to no clock; write sample() of it", where)
 
     def items(self) -> Iterator[tuple[str, Any]]:
         """Yield the names of the nodes and the items of all sections."""
@@ -299,8 +301,3 @@ class ClockInference:
             self._set(
                 rates, relation.first, Rate(period, second.offset - relation.shift * period), where
             )
-
-    def _refuse_continuous(self) -> None:
-        for node, name, where in self._continuous:
-            if self.rate(node):
-                raise_model_error(f"{name} belongs to no clock; write sample() of it", where)

@@ -5,8 +5,6 @@ partitions and from the previous tick do. Therefore only these become variables 
 sets at a tick; the clocked equations remain equations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
@@ -167,7 +165,18 @@ class _Replacement:
             return value
         limited = call.name == "sample" and self._jumps.may_jump(call.arguments[0])
         if limited:
-            value = self._left_limit(value, call)
+            template = self._template(value, call)
+            sampled = self._declare(f"{SAMPLED}{len(self._limits)}", template, with_start=False)
+            self._variables[sampled.name] = replace(
+                self._variables[sampled.name], variability=template.variability
+            )
+            limit = self._declare(f"$limit {len(self._limits)}", template, with_start=False)
+            before = Builtin("pre", (sampled,), call.where)
+            self._limits += [
+                Equation(sampled, value, call.where),
+                Equation(limit, before, call.where),
+            ]
+            value = limit
         if call.name == "hold":
             return self._hold(
                 self._rate(inner), value, call, with_start=True, at_start=not self._has_limits
@@ -209,18 +218,6 @@ class _Replacement:
             self._held[rate, value] = name
             self._bodies.setdefault((rate, at_start), []).append(Assign(name, value, call.where))
         return self._held[rate, value]
-
-    def _left_limit(self, value: Expression, call: Builtin) -> Name:
-        """Return a variable with the value of an expression before the event."""
-        template = self._template(value, call)
-        sampled = self._declare(f"{SAMPLED}{len(self._limits)}", template, with_start=False)
-        self._variables[sampled.name] = replace(
-            self._variables[sampled.name], variability=template.variability
-        )
-        limit = self._declare(f"$limit {len(self._limits)}", template, with_start=False)
-        before = Builtin("pre", (sampled,), call.where)
-        self._limits += [Equation(sampled, value, call.where), Equation(limit, before, call.where)]
-        return limit
 
     def _previous(self, rate: Rate, argument: Expression, call: Builtin) -> Expression:
         """Return the value of a variable at the previous tick, before that its start value."""

@@ -223,7 +223,12 @@ def build_schedule(model: Model) -> Schedule:
         *_event_nodes(model, conditions),
         *(make_node(model, (statement,)) for statement in continuous),
     ]
-    initial = _initial_nodes(model, conditions)
+    initial: list[Node] = []
+    for when in model.whens:
+        initial += split_by_target(model, conditions.at_initialization(when))
+    for body in (*model.algorithms, *model.initial_algorithms):
+        initial += algorithm_nodes(model, body, conditions.at_initialization)
+    initial += [make_node(model, (statement,)) for statement in model.asserts]
     solved, initially_held = solve_initial_equations(
         model, assigned, continuous, set[ScalarKey]().union(*(node.writes for node in initial))
     )
@@ -241,13 +246,19 @@ def build_schedule(model: Model) -> Schedule:
     if len(conditions.clocks) == 1 and not model.states and not model.hybrid:
         event_body = _remove_clock_condition(event_body)
     between = statements_between_events(model, continuous, held)
+    event_body = (*event_body, *_reinits(model, conditions))
+    # edge detectors whose flag is not read are left out
+    read = {item.arguments[0] for item in walk(event_body) if is_call(item, "risen")}
+    event_body = tuple(
+        s
+        for s in event_body
+        if not (isinstance(s, EdgeDetector) and Literal(s.index, "Integer") not in read)
+    )
     return Schedule(
         conditions.clocks,
         len(conditions.edge_detectors),
         _at_initialization(model, merge_statements(sort_topologically(initial))),
-        _substitute_initial(
-            _remove_unused_detectors((*event_body, *_reinits(model, conditions))), False
-        ),
+        _substitute_initial(event_body, False),
         BetweenEvents(*(_substitute_initial(body, False) for body in between)),
     )
 
@@ -308,15 +319,6 @@ def _event_nodes(model: Model, conditions: WhenConditions) -> Iterator[Node]:
     yield from (make_node(model, (statement,)) for statement in model.asserts)
 
 
-def _initial_nodes(model: Model, conditions: WhenConditions) -> list[Node]:
-    nodes: list[Node] = []
-    for when in model.whens:
-        nodes += split_by_target(model, conditions.at_initialization(when))
-    for body in (*model.algorithms, *model.initial_algorithms):
-        nodes += algorithm_nodes(model, body, conditions.at_initialization)
-    return nodes + [make_node(model, (statement,)) for statement in model.asserts]
-
-
 def _remove_clock_condition(body: Body) -> Body:
     """Remove the flag of the only clock: without continuous states, it ticks in every event."""
     simplified = rewrite(body, lambda node: _TRUE if node == tick_flag(0) else node)
@@ -327,16 +329,6 @@ def _remove_clock_condition(body: Body) -> Body:
         else:
             result.append(statement)
     return tuple(result)
-
-
-def _remove_unused_detectors(body: Body) -> Body:
-    """Remove the edge detectors whose flag is not read."""
-    read = {item.arguments[0] for item in walk(body) if is_call(item, "risen")}
-    return tuple(
-        s
-        for s in body
-        if not (isinstance(s, EdgeDetector) and Literal(s.index, "Integer") not in read)
-    )
 
 
 def _is_always_true(condition: Expression) -> bool:

@@ -4,8 +4,6 @@ Models whose equations all have a variable alone on one side keep their array eq
 others the equations are split into scalar ones and solved in general form (`equation_systems`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 
 from ....core.errors import InputError

@@ -227,10 +227,7 @@ class _Reduction:
         keys = scalar_keys(self._model.variables, reference)
         if len(keys) != 1:
             return Literal(1.0, "Real")  # the caller only needs to know that it changes with time
-        return self._new_derivative(next(iter(keys)), variable)
-
-    def _new_derivative(self, key: ScalarKey, variable: Variable) -> Name:
-        """Return the variable for the derivative of a scalar; its equation is added later."""
+        key = next(iter(keys))
         element = f"{key[0]}[{key[1] + 1}]" if variable.shape else key[0]
         name = derivative_name(element)
         if name not in self._variables:

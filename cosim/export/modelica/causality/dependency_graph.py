@@ -4,8 +4,6 @@ A statement follows all statements that write what it reads. The topological ord
 prefers nodes that continue the previous one, so that the C code keeps components together.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial

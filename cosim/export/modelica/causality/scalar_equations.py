@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import reduce
 from itertools import product
@@ -13,7 +13,7 @@ import numpy as np
 from ..model.arithmetic import EvaluationError
 from ..model.builtin_functions import BUILTIN_FUNCTIONS
 from ..model.evaluate import Evaluator, convert_to_type
-from ..model.flat_model import Equation, Function, Model
+from ..model.flat_model import Equation, Model
 from ..model.syntax_tree import (
     Array,
     Binary,
@@ -54,7 +54,14 @@ class EquationSplitter:
             for v in model.variables.values()
             if v.type != "String"
         }
-        self._evaluate = _ShapeEvaluator(_uncalled(model.functions), {**values, "time": 0.0})
+        # external functions leave their outputs zero: only the sizes matter
+        self._evaluate = _ShapeEvaluator(
+            {
+                name: replace(f, external=replace(f.external, library=None)) if f.external else f
+                for name, f in model.functions.items()
+            },
+            {**values, "time": 0.0},
+        )
 
     def split(self, equation: Equation) -> Iterator[Equation]:
         """Yield one equation for each element.
@@ -234,14 +241,3 @@ def _total(terms: Sequence[Expression]) -> Expression:
     for term in terms[1:]:
         result = Binary("+", result, term)
     return result
-
-
-def _uncalled(functions: Mapping[str, Function]) -> dict[str, Function]:
-    """Return the functions, of which external ones leave their outputs zero.
-
-    Only the sizes matter.
-    """
-    return {
-        name: replace(f, external=replace(f.external, library=None)) if f.external else f
-        for name, f in functions.items()
-    }

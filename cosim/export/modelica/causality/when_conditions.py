@@ -4,8 +4,6 @@ A when-clause becomes an if-statement on the event flags due(k), "clock k ticks 
 risen(k), "the condition of edge detector k has become true in this event".
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
@@ -121,22 +119,18 @@ class WhenConditions:
     def _flag(self, condition: Expression, where: SourceLocation | None) -> Builtin:
         if is_call(condition, "sample"):
             return tick_flag(self._clock_index(condition, where))
-        return edge_flag(
-            self._edge_detector_index(rewrite_outermost(condition, self.as_tick_flag), where)
-        )
+        condition = rewrite_outermost(condition, self.as_tick_flag)
+        conditions = [detector.condition for detector in self.edge_detectors]
+        if condition not in conditions:
+            conditions.append(condition)
+            self.edge_detectors.append(EdgeDetector(len(self.edge_detectors), condition, where))
+        return edge_flag(conditions.index(condition))
 
     def as_tick_flag(self, node: Any) -> Builtin | None:
         """Return the event flag of a sample(), or None for all other nodes."""
         if not (is_call(node, "sample")):
             return None
         return tick_flag(self._clock_index(node, node.where))
-
-    def _edge_detector_index(self, condition: Expression, where: SourceLocation | None) -> int:
-        conditions = [detector.condition for detector in self.edge_detectors]
-        if condition not in conditions:
-            conditions.append(condition)
-            self.edge_detectors.append(EdgeDetector(len(self.edge_detectors), condition, where))
-        return conditions.index(condition)
 
     def _clock_index(self, sample: Builtin, where: SourceLocation | None) -> int:
         if len(sample.arguments) != 2:

@@ -1,4 +1,5 @@
-/* Utility functions for external C functions, as the Modelica language specification defines them. */
+/* Utility functions for external C functions, as the Modelica language specification defines
+   them. */
 #ifndef MODELICA_UTILITIES_H
 #define MODELICA_UTILITIES_H
 
@@ -23,7 +24,8 @@ void ModelicaFormatWarning(const char *format, ...) MODELICA_FORMATATTR_PRINTF;
 void ModelicaVFormatWarning(const char *format, va_list arguments) MODELICA_FORMATATTR_VPRINTF;
 MODELICA_NORETURN void ModelicaError(const char *text);
 MODELICA_NORETURN void ModelicaFormatError(const char *format, ...) MODELICA_FORMATATTR_PRINTF;
-MODELICA_NORETURN void ModelicaVFormatError(const char *format, va_list arguments) MODELICA_FORMATATTR_VPRINTF;
+MODELICA_NORETURN void ModelicaVFormatError(const char *format,
+                                            va_list arguments) MODELICA_FORMATATTR_VPRINTF;
 char *ModelicaAllocateString(size_t length);
 char *ModelicaAllocateStringWithErrorReturn(size_t length);
 char *ModelicaDuplicateString(const char *text);

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- errors and messages --------------------------------------------------------------------------------------------- */
+/* ---- errors and messages --------------------------------------------------------------------- */
 
 static _Thread_local jmp_buf *current_frame;
 static _Thread_local char error_text[512];
@@ -27,9 +27,11 @@ jmp_buf *external_frame(jmp_buf *frame)
 static void append(char *buffer, size_t size, const char *format, va_list arguments)
 {
     size_t length = strlen(buffer);
-    if (length > 0 && length + 2 < size) length += (size_t)snprintf(buffer + length, size - length, "; ");
+    if (length > 0 && length + 2 < size)
+        length += (size_t)snprintf(buffer + length, size - length, "; ");
     vsnprintf(buffer + length, size - length, format, arguments);
-    for (size_t end = strlen(buffer); end > 0 && buffer[end - 1] == '\n'; end--) buffer[end - 1] = '\0';
+    for (size_t end = strlen(buffer); end > 0 && buffer[end - 1] == '\n'; end--)
+        buffer[end - 1] = '\0';
     for (char *c = buffer; *c != '\0'; c++)
         if (*c == '\n') *c = ' ';
 }
@@ -51,7 +53,10 @@ void ModelicaFormatError(const char *format, ...)
 
 void ModelicaError(const char *text) { ModelicaFormatError("%s", text); }
 
-void ModelicaVFormatMessage(const char *format, va_list arguments) { append(messages, sizeof messages, format, arguments); }
+void ModelicaVFormatMessage(const char *format, va_list arguments)
+{
+    append(messages, sizeof messages, format, arguments);
+}
 
 void ModelicaFormatMessage(const char *format, ...)
 {
@@ -62,7 +67,10 @@ void ModelicaFormatMessage(const char *format, ...)
 }
 
 void ModelicaMessage(const char *text) { ModelicaFormatMessage("%s", text); }
-void ModelicaVFormatWarning(const char *format, va_list arguments) { ModelicaVFormatMessage(format, arguments); }
+void ModelicaVFormatWarning(const char *format, va_list arguments)
+{
+    ModelicaVFormatMessage(format, arguments);
+}
 
 void ModelicaFormatWarning(const char *format, ...)
 {
@@ -74,7 +82,7 @@ void ModelicaFormatWarning(const char *format, ...)
 
 void ModelicaWarning(const char *text) { ModelicaFormatMessage("%s", text); }
 
-/* ---- Strings --------------------------------------------------------------------------------------------------------- */
+/* ---- Strings --------------------------------------------------------------------------------- */
 
 typedef struct String {
     struct String *next;
@@ -105,7 +113,10 @@ char *ModelicaDuplicateStringWithErrorReturn(const char *text)
     return copy == NULL ? NULL : strcpy(copy, text);
 }
 
-char *ModelicaDuplicateString(const char *text) { return strcpy(ModelicaAllocateString(strlen(text)), text); }
+char *ModelicaDuplicateString(const char *text)
+{
+    return strcpy(ModelicaAllocateString(strlen(text)), text);
+}
 
 static void free_strings(void)
 {
@@ -120,7 +131,8 @@ const char *external_reason(const char *reason, char *log, size_t size)
 {
     static _Thread_local char text[2 * sizeof error_text];
     const size_t length = log == NULL ? 0 : strlen(log);
-    if (log != NULL && messages[0] != '\0') snprintf(log + length, size - length, "%s%s", length > 0 ? "; " : "", messages);
+    if (log != NULL && messages[0] != '\0')
+        snprintf(log + length, size - length, "%s%s", length > 0 ? "; " : "", messages);
     messages[0] = '\0';
     if (reason != NULL && error_text[0] != '\0') {
         snprintf(text, sizeof text, "%s: %s", reason, error_text);
@@ -131,7 +143,7 @@ const char *external_reason(const char *reason, char *log, size_t size)
     return reason;
 }
 
-/* ---- external objects ------------------------------------------------------------------------------------------------ */
+/* ---- external objects ------------------------------------------------------------------------ */
 
 typedef struct {
     const void *owner;
@@ -163,15 +175,20 @@ uint64_t external_hash(uint64_t hash, const void *bytes, size_t size)
     return hash;
 }
 
-uint64_t external_hash_text(uint64_t hash, const char *text) { return external_hash(hash, text, strlen(text) + 1); }
+uint64_t external_hash_text(uint64_t hash, const char *text)
+{
+    return external_hash(hash, text, strlen(text) + 1);
+}
 
-/* Removes the objects of an owner with a number, or all if the number is negative, except the one with the identifier `kept`. */
+/* Removes the objects of an owner with a number, or all if the number is negative, except the one
+   with the identifier `kept`. */
 static void delete(const void *owner, int32_t number, uint64_t kept)
 {
     for (size_t k = 0;; k++) {
         acquire();
-        while (k < object_count && (objects[k].owner != owner || objects[k].identifier == kept ||
-                                    (number >= 0 && (objects[k].identifier & NUMBER_MASK) != (uint64_t)number)))
+        while (k < object_count &&
+               (objects[k].owner != owner || objects[k].identifier == kept ||
+                (number >= 0 && (objects[k].identifier & NUMBER_MASK) != (uint64_t)number)))
             k++;
         if (k >= object_count) break;
         const Object found = objects[k];
@@ -197,7 +214,8 @@ void *external_object(const void *owner, uint64_t identifier)
     void *object = NULL;
     acquire();
     for (size_t k = 0; k < object_count && object == NULL; k++)
-        if (objects[k].owner == owner && objects[k].identifier == identifier) object = objects[k].object;
+        if (objects[k].owner == owner && objects[k].identifier == identifier)
+            object = objects[k].object;
     release();
     return object;
 }

@@ -3,8 +3,6 @@
 The library of a model's C code, compiled on first use and called by ctypes.
 """
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

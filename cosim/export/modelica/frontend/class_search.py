@@ -4,8 +4,6 @@ The models that a file declares are listed if a model is not found. An operator 
 refuses without a place is searched in the classes that a model uses, directly or indirectly.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -19,7 +17,8 @@ from ..model.syntax_tree import SourceLocation
 _TOKEN = re.compile(
     r'//[^\n]*|/\*.*?\*/|"(?:[^"\\]|\\.)*"|\bend\s+(?P<end>\w+)\s*;|'
     r"(?P<prefix>\b(?:partial|redeclare|replaceable)\s+)*"
-    r"\b(?P<kind>model|block|package|function|record|connector|class|type)\s+(?P<name>[A-Za-z_]\w*)(?P<short>\s*=)?",
+    r"\b(?P<kind>model|block|package|function|record|connector|class|type)\s+"
+    r"(?P<name>[A-Za-z_]\w*)(?P<short>\s*=)?",
     re.DOTALL,
 )
 _MODELS = ("model", "block")

@@ -47,7 +47,8 @@ def fold_constants(model: Model) -> Model:
     while ready := [
         v
         for v in foldable.values()
-        if v.name not in literals | dict.fromkeys(failed) and _is_ready(v, literals)
+        if v.name not in literals | dict.fromkeys(failed)
+        and variable_names(_value(v)) <= set(literals)
     ]:
         values = {name: literal.value for name, literal in literals.items()}
         for variable in ready:
@@ -188,10 +189,6 @@ def _is_foldable(variable: Variable, structural: set[str]) -> bool:
     return hidden and variable.type in _DISCRETE_TYPES
 
 
-def _is_ready(variable: Variable, literals: dict[str, Literal]) -> bool:
-    return variable_names(_value(variable)) <= set(literals)
-
-
 def _unroll_known(node: Comprehension, model: Model) -> Expression:
     """Return an array constructor with an iterator as a list of elements, if its range is known."""
     if not isinstance(node.range, Range | Array) or variable_names(node.range):
@@ -208,7 +205,8 @@ def string_parameters(model: Model) -> set[str]:
         for v in model.variables.values()
         if v.type == "String" and v.variability == "parameter"
     }
-    for call in walk(_expressions(model)):
+    bindings = tuple((v.binding, v.start) for v in model.variables.values())
+    for call in walk((bindings, model.equations, model.algorithms, model.whens)):
         if isinstance(call, Call):
             found |= variable_names(
                 tuple(a for a, local in _inputs(call, model) if local.type == "String")
@@ -254,11 +252,6 @@ def fold_strings(model: Model) -> Model:
         algorithms=rewrite(model.algorithms, fold),
         whens=rewrite(model.whens, fold),
     )
-
-
-def _expressions(model: Model) -> tuple[Any, ...]:
-    bindings = tuple((v.binding, v.start) for v in model.variables.values())
-    return (bindings, model.equations, model.algorithms, model.whens)
 
 
 def _inputs(call: Call, model: Model) -> list[tuple[Expression, Any]]:

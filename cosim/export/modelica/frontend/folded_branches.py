@@ -6,8 +6,6 @@ The flat model does not record this. Therefore the nesting depths are compared: 
 fewer `if` in the flat model than in the source file has lost one.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

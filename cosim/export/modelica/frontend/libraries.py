@@ -7,8 +7,6 @@ requires versions. The annotation `conversion(noneFromVersion=...)` of a library
 versions that it replaces without changes (section 18.8).
 """
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -264,23 +262,19 @@ def split_arguments(text: str) -> list[tuple[str, str]]:
     [('version', '"1.0"'), ('uses', 'Lib(version="2")')]
     """
     arguments = []
-    for part in _split_at_commas(text):
+    # split at the commas outside of parentheses, strings and comments
+    parts, start = [], 0
+    for position, character, depth in _significant(text):
+        if character == "," and depth == 0:
+            parts.append(text[start:position])
+            start = position + 1
+    for part in [*parts, text[start:]]:
         if match := _ARGUMENT.match(part):
             rest = part[match.end() :].strip()
             arguments.append(
                 (match[1], rest if match[2] == "=" else _inside_parentheses(f"({rest}"))
             )
     return arguments
-
-
-def _split_at_commas(text: str) -> list[str]:
-    """Split a text at the commas outside of parentheses, strings and comments."""
-    parts, start = [], 0
-    for position, character, depth in _significant(text):
-        if character == "," and depth == 0:
-            parts.append(text[start:position])
-            start = position + 1
-    return [*parts, text[start:]]
 
 
 def _inside_parentheses(text: str) -> str:

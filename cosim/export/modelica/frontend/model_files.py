@@ -248,7 +248,8 @@ def _names(file: Path) -> set[str]:
 #: beginning of the message of an assertion that stands for terminate()
 MARK = "terminate: "
 _TERMINATE_TOKEN = re.compile(
-    r'//[^\n]*|/\*.*?\*/|"(?:[^"\\]|\\.)*"|\b(?P<section>algorithm|equation)\b|(?P<call>\bterminate\s*\()',
+    r'//[^\n]*|/\*.*?\*/|"(?:[^"\\]|\\.)*"|'
+    r"\b(?P<section>algorithm|equation)\b|(?P<call>\bterminate\s*\()",
     re.DOTALL,
 )
 

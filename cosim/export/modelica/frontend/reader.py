@@ -7,8 +7,6 @@ equations of the first iterations and a template for all iterations. The equatio
 iterations are placeholders such as `der(x[3]) = 0.0`, in which only the left side is correct.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import chain, product
@@ -115,8 +113,10 @@ class ModelReader(StatementReader):
             name=name,
             type=kind,
             shape=tuple(node["dims"]),
-            variability=self._variability(node),
-            causality=self._causality(node),
+            variability=_word(
+                node["variability"], "discrete" if node["is_discrete_type"] else "continuous"
+            ),
+            causality=_word(node["causality"], "local"),
             start=self._optional(node["start"]),
             binding=self._optional(node["binding"]),
             bound_by_modifier=node["binding_from_modification"],
@@ -135,18 +135,6 @@ class ModelReader(StatementReader):
             enumeration=type_name if kind == "Enumeration" else "",
             where=self.locate(node),
         )
-
-    def _variability(self, node: Json) -> Any:
-        kind = node["variability"]
-        word = (kind if isinstance(kind, str) else split_tagged(kind)[0]).lower()
-        if word == "empty":
-            return "discrete" if node["is_discrete_type"] else "continuous"
-        return word
-
-    def _causality(self, node: Json) -> Any:
-        kind = node["causality"]
-        word = (kind if isinstance(kind, str) else split_tagged(kind)[0]).lower()
-        return "local" if word == "empty" else word
 
     def _text(self, node: Any) -> str:
         if node is None or isinstance(node, str):
@@ -322,6 +310,12 @@ class ModelReader(StatementReader):
             tuple(Literal(int(k), "Integer") for k in numbers),
             where,
         )
+
+
+def _word(kind: Any, default: str) -> Any:
+    """Return the name of a kind in rumoca's document, or the default if it is empty."""
+    word = (kind if isinstance(kind, str) else split_tagged(kind)[0]).lower()
+    return default if word == "empty" else word
 
 
 def _is_default(variable: Variable) -> bool:

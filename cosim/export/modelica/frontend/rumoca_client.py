@@ -1,7 +1,5 @@
 """Client of the child process in which rumoca runs, and the parts of a model that it may change."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -70,7 +68,10 @@ def run_rumoca(
     }
     with TemporaryFile() as output, TemporaryFile() as errors:
         reason = _run_process(json.dumps(request).encode(), output, errors)
-        messages = _read_messages(output)
+        output.seek(0)
+        messages: list[dict[str, Any]] = [
+            json.loads(line) for line in output if line.endswith(b"\n")
+        ]
         errors.seek(0)
         if _OUT_OF_MEMORY in errors.read(OUTPUT_LIMIT):
             reason = f"it needs more than {MEMORY_LIMIT >> 30} GiB of memory"
@@ -107,14 +108,9 @@ def _run_process(request: bytes, output: Any, errors: Any) -> str:
     )
 
 
-def _read_messages(output: Any) -> list[dict[str, Any]]:
-    """Return the complete messages."""
-    output.seek(0)
-    return [json.loads(line) for line in output if line.endswith(b"\n")]
-
-
 _PART_TOKEN = re.compile(
-    r'(?P<comment>//[^\n]*|/\*.*?\*/)|(?P<string>"(?:[^"\\]|\\.)*")|(?P<word>[A-Za-z_]\w*)|(?P<symbol>:=|==|<=|>=|<>|\S)',
+    r'(?P<comment>//[^\n]*|/\*.*?\*/)|(?P<string>"(?:[^"\\]|\\.)*")|'
+    r"(?P<word>[A-Za-z_]\w*)|(?P<symbol>:=|==|<=|>=|<>|\S)",
     re.DOTALL,
 )
 _SECTIONS = ("equation", "algorithm")

@@ -5,8 +5,6 @@ it, and in libraries (`libraries.py`). Other files beside it are never read. A f
 a package (`within P;`) is loaded as a member of this package.
 """
 
-from __future__ import annotations
-
 import gzip
 import json
 import re

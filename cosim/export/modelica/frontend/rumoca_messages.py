@@ -1,7 +1,5 @@
 """Conversion of the front end's messages to problems with file and line."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -60,10 +58,12 @@ _EXPECTED = re.compile(r"help: expected one of: (?P<tokens>.*)", re.DOTALL)
 
 #: words that are no names (Modelica Language Specification 3.6, section 2.3.3)
 _RESERVED = re.compile(
-    "algorithm|and|annotation|block|break|class|connect|connector|constant|constrainedby|der|discrete|each|else|elseif|"
-    "elsewhen|encapsulated|end|enumeration|equation|expandable|extends|external|false|final|flow|for|function|if|import|"
-    "impure|in|initial|inner|input|loop|model|not|operator|or|outer|output|package|parameter|partial|protected|public|pure|"
-    "record|redeclare|replaceable|return|stream|then|true|type|when|while|within"
+    "algorithm|and|annotation|block|break|class|connect|connector|constant|"
+    "constrainedby|der|discrete|each|else|elseif|elsewhen|encapsulated|end|enumeration|"
+    "equation|expandable|extends|external|false|final|flow|for|function|if|import|"
+    "impure|in|initial|inner|input|loop|model|not|operator|or|outer|output|package|"
+    "parameter|partial|protected|public|pure|record|redeclare|replaceable|return|stream|"
+    "then|true|type|when|while|within"
 )
 
 
@@ -127,35 +127,19 @@ def to_problems(
 def _to_problem(
     reason: str, name: str, path: Path, sources: ModelicaSources, part: Sequence[int] | None
 ) -> Problem:
-    """Convert a reason.
+    """Convert a reason to a problem with a place.
 
-    That of an operator that it does not name or place, else the reason with a place.
+    An operator that is not supported has a message and a place of its own. The place is else the
+    first of these that exists: the one at the end of the reason; that of the class of a library
+    that it names; the first line with a name that it quotes, in the `part` of the model (first and
+    last line) to which the error is due; the first line of the model's file with an operator that
+    it names; the first line of this part; the first line of all files with such a name; that of
+    the model.
     """
     explained = explain_unsupported_operator(reason, sources)
     if explained and explained.where:
         return explained
-    return _locate_problem(explained.message if explained else reason, name, path, sources, part)
-
-
-def _shorten(reason: str) -> str:
-    """Return a reason without the front end's phases and internal counts."""
-    for message, meaning in _MEANINGS.items():
-        if message in reason:
-            return meaning
-    return _COUNTS.sub("", _PHASE.sub("", reason))
-
-
-def _locate_problem(
-    reason: str, name: str, path: Path, sources: ModelicaSources, part: Sequence[int] | None
-) -> Problem:
-    """Add a location to a reason.
-
-    It is the first of these that exists: the one at the end of the reason; that of the class of a
-    library that it names; the first line with a name that it quotes, in the `part` of the model
-    (first and last line) to which the error is due; the first line of the model's file with an
-    operator that it names; the first line of this part; the first line of all files with such a
-    name; that of the model.
-    """
+    reason = explained.message if explained else reason
     if ending := _LOCATION_SUFFIX.search(reason):
         where = SourceLocation(sources.find(ending["file"]) or path, int(ending["line"]))
         return Problem(_shorten(reason[: ending.start()].rstrip()), str(where))
@@ -169,6 +153,14 @@ def _locate_problem(
     place = place or _find_quoted_name(f"{reason} {meaning}", sources.files)
     place = place or sources.locate_in_libraries(_OPERATOR.findall(f"{reason} {meaning}"))
     return Problem(meaning, str(place or sources.locate_class(name)))
+
+
+def _shorten(reason: str) -> str:
+    """Return a reason without the front end's phases and internal counts."""
+    for message, meaning in _MEANINGS.items():
+        if message in reason:
+            return meaning
+    return _COUNTS.sub("", _PHASE.sub("", reason))
 
 
 def _find_quoted_name(

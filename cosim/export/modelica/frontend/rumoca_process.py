@@ -8,8 +8,6 @@ the requested one. The lines are those of the first part of the model to which t
 they are null if the error has a place, or if there is no such part.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import resource

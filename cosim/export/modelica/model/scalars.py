@@ -1,7 +1,5 @@
 """Scalars of a flat model: variables, and elements of arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from itertools import product
 from math import prod

@@ -115,7 +115,11 @@ def read_references(node: Any) -> Iterator[Name | Index]:
             for item in read_references((node.residuals, node.jacobian))
             if item not in node.unknowns
         )
-    elif isinstance(node, Name) or (isinstance(node, Index) and _has_literal_subscripts(node)):
+    elif isinstance(node, Name) or (
+        isinstance(node, Index)
+        and isinstance(node.base, Name)
+        and all(isinstance(s, Literal) for s in node.subscripts)
+    ):
         yield node
     elif isinstance(node, tuple) and not isinstance(node, SourceLocation | Colon):
         for item in node:
@@ -128,10 +132,6 @@ def read_references(node: Any) -> Iterator[Name | Index]:
 def _references_in_subscripts(target: Name | Index) -> Iterator[Name | Index]:
     if isinstance(target, Index):
         yield from read_references(target.subscripts)
-
-
-def _has_literal_subscripts(node: Index) -> bool:
-    return isinstance(node.base, Name) and all(isinstance(s, Literal) for s in node.subscripts)
 
 
 def variable_names(node: Any) -> set[str]:

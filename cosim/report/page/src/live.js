@@ -1,4 +1,5 @@
-// A running simulation: rows come from the server of this page, and commands are sent to it (cosim/report/live/server.py).
+// A running simulation: rows come from the server of this page, and commands are sent to it
+// (cosim/report/live/server.py).
 import { Run } from "./run.js";
 
 const REST = 60; // ms between requests
@@ -19,7 +20,9 @@ export class GrowingRun extends Run {
       place += count;
     }
     this.rows += count;
-    this.columns = new Map([...this.table].map(([name, column]) => [name, column.subarray(0, this.rows)]));
+    this.columns = new Map(
+      [...this.table].map(([name, column]) => [name, column.subarray(0, this.rows)]),
+    );
     this.time = this.columns.get("time");
     this.first = this.time[0];
     this.last = this.time[this.rows - 1];
@@ -40,7 +43,8 @@ export class Live {
     const bytes = new Uint8Array(await response.arrayBuffer());
     const end = bytes.indexOf(10);
     this.state = JSON.parse(new TextDecoder().decode(bytes.subarray(0, end)));
-    if (this.state.count) this.run.append(new Float32Array(bytes.slice(end + 1).buffer), this.state.count);
+    if (this.state.count)
+      this.run.append(new Float32Array(bytes.slice(end + 1).buffer), this.state.count);
   }
 
   async begin() {
@@ -48,7 +52,10 @@ export class Live {
     return this.run;
   }
 
-  /** Fetch until the run ends and call `listener` after every response. The run has ended too if the server is gone. */
+  /**
+   * Fetch until the run ends and call `listener` after every response. The run has ended too if
+   * the server is gone.
+   */
   async follow(listener) {
     while (!this.state.complete) {
       await new Promise((resume) => setTimeout(resume, REST));
@@ -65,7 +72,11 @@ export class Live {
   async command(message) {
     try {
       const headers = { "Content-Type": "application/json" };
-      const response = await fetch("command", { method: "POST", headers, body: JSON.stringify(message) });
+      const response = await fetch("command", {
+        method: "POST",
+        headers,
+        body: JSON.stringify(message),
+      });
       return await response.json();
     } catch {
       return { error: "the run has ended" };

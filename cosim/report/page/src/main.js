@@ -23,7 +23,9 @@ async function start(root, data) {
   const page = build(root);
   if (data.failure) markFailure(data.scene.marks, data.failure, runs[0]);
   const command = live && commander(page, live);
-  const player = live ? new LivePlayer(live, command) : new Player(runs[0].first, Math.max(...runs.map((run) => run.last)));
+  const player = live
+    ? new LivePlayer(live, command)
+    : new Player(runs[0].first, Math.max(...runs.map((run) => run.last)));
   connectTime(page, player);
   const view = sceneView(page, data.scene, runs);
   if (view) {
@@ -47,7 +49,8 @@ async function start(root, data) {
 
 /** Add a mark for the failure of a run, unless the scene marks it already. */
 function markFailure(marks, { time, label }, run) {
-  if (!marksOf(run, marks).some((mark) => Math.abs(mark.time - time) < SAME)) marks.push({ time, label, colour: "#c62828" });
+  if (!marksOf(run, marks).some((mark) => Math.abs(mark.time - time) < SAME))
+    marks.push({ time, label, colour: "#c62828" });
 }
 
 /** Show new rows until the run has ended; then the page is an ordinary replay. */

@@ -1,5 +1,15 @@
-// Waypoints: circles of acceptance on the water, merged into one draw call, with numbers above them.
-import { CanvasTexture, DoubleSide, Group, Mesh, MeshBasicMaterial, RingGeometry, Sprite, SpriteMaterial } from "three";
+// Waypoints: circles of acceptance on the water, merged into one draw call, with numbers above
+// them.
+import {
+  CanvasTexture,
+  DoubleSide,
+  Group,
+  Mesh,
+  MeshBasicMaterial,
+  RingGeometry,
+  Sprite,
+  SpriteMaterial,
+} from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 
 /** A disk with a text, of the same size at every distance. */
@@ -17,7 +27,9 @@ export function label(text, colour = "rgba(20, 30, 40, 0.78)") {
   pen.textBaseline = "middle";
   pen.fillText(text, 48, 51);
   const map = new CanvasTexture(canvas);
-  const sprite = new Sprite(new SpriteMaterial({ map, sizeAttenuation: false, depthTest: false, transparent: true }));
+  const sprite = new Sprite(
+    new SpriteMaterial({ map, sizeAttenuation: false, depthTest: false, transparent: true }),
+  );
   sprite.scale.setScalar(0.026);
   return sprite;
 }
@@ -35,6 +47,15 @@ function sign({ position: [x, y, z], label: text }) {
 
 export function markersOf(places) {
   if (!places.length) return new Group();
-  const material = new MeshBasicMaterial({ color: "#ffb020", transparent: true, opacity: 0.9, side: DoubleSide, forceSinglePass: true });
-  return new Group().add(new Mesh(mergeGeometries(places.map(ring)), material), ...places.map(sign));
+  const material = new MeshBasicMaterial({
+    color: "#ffb020",
+    transparent: true,
+    opacity: 0.9,
+    side: DoubleSide,
+    forceSinglePass: true,
+  });
+  return new Group().add(
+    new Mesh(mergeGeometries(places.map(ring)), material),
+    ...places.map(sign),
+  );
 }

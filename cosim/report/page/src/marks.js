@@ -1,4 +1,5 @@
-// Marks: moments at which a Boolean signal first becomes true, such as a crash, and the moment of a failure.
+// Marks: moments at which a Boolean signal first becomes true, such as a crash, and the moment of a
+// failure.
 import { label } from "./markers.js";
 
 /** The marks of a scene that a run has reached: {time, label, colour, on}. */

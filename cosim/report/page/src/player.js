@@ -4,7 +4,16 @@ const READING = 100; // ms between two updates of texts
 
 export class Player {
   constructor(first, last) {
-    Object.assign(this, { first, last, time: first, speed: 1, playing: false, listeners: [], readers: [], toldReaders: 0 });
+    Object.assign(this, {
+      first,
+      last,
+      time: first,
+      speed: 1,
+      playing: false,
+      listeners: [],
+      readers: [],
+      toldReaders: 0,
+    });
   }
 
   /** True if the button shows that time advances. */
@@ -60,7 +69,10 @@ export class Player {
   }
 }
 
-/** The clock of a running simulation, which it pauses and speeds up; after its end the clock of an ordinary replay. */
+/**
+ * The clock of a running simulation, which it pauses and speeds up; after its end the clock of
+ * an ordinary replay.
+ */
 export class LivePlayer extends Player {
   /** `command` sends a message to the simulation. */
   constructor(live, command) {

@@ -8,7 +8,8 @@ const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9
 const HEIGHT = 162;
 
 /** Four significant digits, without an exponent if that is short. */
-export const shown = (value) => (Number.isFinite(value) ? String(Number(value.toPrecision(4))) : "–");
+export const shown = (value) =>
+  Number.isFinite(value) ? String(Number(value.toPrecision(4))) : "–";
 
 /** Tick labels with all digits; all have exponents if that is shorter. */
 function written(_, values) {
@@ -21,13 +22,22 @@ const longest = (texts) => Math.max(...texts.map((text) => text.length));
 
 const FONT = "11px system-ui, sans-serif";
 const AXIS = {
-  stroke: () => theme().ink, grid: { stroke: () => theme().rule, width: 1 }, ticks: { show: false }, values: written,
-  font: FONT, labelFont: FONT, labelSize: 14, labelGap: 0,
+  stroke: () => theme().ink,
+  grid: { stroke: () => theme().rule, width: 1 },
+  ticks: { show: false },
+  values: written,
+  font: FONT,
+  labelFont: FONT,
+  labelSize: 14,
+  labelGap: 0,
 };
 
 /** The axes of time and of values with a unit, "" without a label. */
 function axes(unit) {
-  return [{ ...AXIS, size: 24, space: 70, label: "time (s)" }, { ...AXIS, size: room, space: 28, label: unit }];
+  return [
+    { ...AXIS, size: 24, space: 70, label: "time (s)" },
+    { ...AXIS, size: room, space: 28, label: unit },
+  ];
 }
 
 const JUMP = 5; // rad: larger differences of successive angles are turns
@@ -49,10 +59,16 @@ function valuesOf(run, name) {
   return run.units[name] === "rad" ? unwrapped(run.values(name)) : run.values(name);
 }
 
-/** The width of an axis: equal in all plots with short tick labels, so that their time axes are aligned. */
+/**
+ * The width of an axis: equal in all plots with short tick labels, so that their time axes are
+ * aligned.
+ */
 function room(chart, texts, number) {
   [chart.ctx.font] = chart.axes[number].font;
-  const widest = Math.max(0, ...(texts ?? []).map((text) => chart.ctx.measureText(text).width / uPlot.pxRatio));
+  const widest = Math.max(
+    0,
+    ...(texts ?? []).map((text) => chart.ctx.measureText(text).width / uPlot.pxRatio),
+  );
   return Math.max(54, widest + 12);
 }
 
@@ -64,7 +80,13 @@ class Plot {
     this.legend = this.element.appendChild(document.createElement("figcaption"));
     this.values = signals.map((name, i) => this.#entry(name, COLOURS[i % COLOURS.length]));
     const close = this.legend.appendChild(document.createElement("button"));
-    Object.assign(close, { type: "button", className: "close", textContent: "×", title: "Remove this plot", ariaLabel: "Remove this plot" });
+    Object.assign(close, {
+      type: "button",
+      className: "close",
+      textContent: "×",
+      title: "Remove this plot",
+      ariaLabel: "Remove this plot",
+    });
     close.addEventListener("click", () => plots.remove(this));
     this.#draw();
   }
@@ -80,23 +102,44 @@ class Plot {
 
   #series() {
     return this.signals.flatMap((name, i) =>
-      this.runs.filter((run) => run.has(name)).map((run) => ({
-        run, name,
-        label: name, stroke: COLOURS[i % COLOURS.length], width: run === this.runs[0] ? 1.6 : 1.3,
-        dash: run === this.runs[0] ? undefined : [5, 4], points: { show: false },
-      })));
+      this.runs
+        .filter((run) => run.has(name))
+        .map((run) => ({
+          run,
+          name,
+          label: name,
+          stroke: COLOURS[i % COLOURS.length],
+          width: run === this.runs[0] ? 1.6 : 1.3,
+          dash: run === this.runs[0] ? undefined : [5, 4],
+          points: { show: false },
+        })),
+    );
   }
 
   #draw() {
     const series = this.#series();
-    const sorted = this.runs.flatMap((run) => series.filter((s) => s.run === run)).map((s) => ({ ...s, spanGaps: true }));
+    const sorted = this.runs
+      .flatMap((run) => series.filter((s) => s.run === run))
+      .map((s) => ({ ...s, spanGaps: true }));
     const unit = this.runs[0].units[this.signals[0]] ?? "";
     const options = {
-      width: Math.max(this.element.clientWidth, 120), height: HEIGHT, legend: { show: false }, padding: [8, 10, 0, 0],
-      scales: { x: { time: false, range: () => this.plots.present }, y: { range: (_, low, high) => padded(low, high) } },
-      axes: axes(unit), series: [{}, ...sorted],
+      width: Math.max(this.element.clientWidth, 120),
+      height: HEIGHT,
+      legend: { show: false },
+      padding: [8, 10, 0, 0],
+      scales: {
+        x: { time: false, range: () => this.plots.present },
+        y: { range: (_, low, high) => padded(low, high) },
+      },
+      axes: axes(unit),
+      series: [{}, ...sorted],
       hooks: { draw: [() => (this.#mark(), this.move())] },
-      cursor: { drag: { x: false, y: false, setScale: false }, points: { show: false }, y: false, x: false },
+      cursor: {
+        drag: { x: false, y: false, setScale: false },
+        points: { show: false },
+        y: false,
+        x: false,
+      },
     };
     this.chart = new uPlot(options, this.#data(series), this.element);
     this.element.dataset.unit = unit;
@@ -113,13 +156,17 @@ class Plot {
       const line = this.chart.over.appendChild(document.createElement("div"));
       line.className = "mark";
       line.title = `${label} at ${time.toFixed(2)} s`;
-      line.style.cssText = `border-color:${colour};transform:translateX(${this.chart.valToPos(time, "x")}px)`;
+      const x = this.chart.valToPos(time, "x");
+      line.style.cssText = `border-color:${colour};transform:translateX(${x}px)`;
     }
   }
 
   #data(series) {
     this.drawn = series.map(({ run, name }) => ({ run, name, values: valuesOf(run, name) }));
-    const tables = this.runs.map((run) => [run.time, ...this.drawn.filter((each) => each.run === run).map(({ values }) => values)]);
+    const tables = this.runs.map((run) => [
+      run.time,
+      ...this.drawn.filter((each) => each.run === run).map(({ values }) => values),
+    ]);
     return tables.length === 1 ? tables[0] : uPlot.join(tables.filter((table) => table.length > 1));
   }
 
@@ -195,9 +242,20 @@ export class Plots {
     this.look(shifted([low, high], share * (high - low)));
   }
 
-  /** Add a plot of the signals that match any of the patterns ("*" matches any text); return false if there are none. */
+  /**
+   * Add a plot of the signals that match any of the patterns ("*" matches any text); return
+   * false if there are none.
+   */
   add(patterns) {
-    const tests = patterns.map((pattern) => new RegExp(`^${pattern.split("*").map((s) => s.replace(/[.[\]()+?^$|{}\\]/g, "\\$&")).join(".*")}$`));
+    const tests = patterns.map(
+      (pattern) =>
+        new RegExp(
+          `^${pattern
+            .split("*")
+            .map((s) => s.replace(/[.[\]()+?^$|{}\\]/g, "\\$&"))
+            .join(".*")}$`,
+        ),
+    );
     const signals = this.runs[0].signals.filter((name) => tests.some((test) => test.test(name)));
     if (!signals.length) return false;
     this.list.push(new Plot(this.parent, signals.slice(0, 12), this.runs, this));

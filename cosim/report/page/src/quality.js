@@ -1,13 +1,15 @@
-// Adaptive quality: as high as possible at a smooth frame rate while something moves, and the highest when nothing moves.
+// Adaptive quality: as high as possible at a smooth frame rate while something moves, and the
+// highest when nothing moves.
 
 const SMOOTH = 38; // ms: longer frames are visible as stutter
 const EASY = 20; // ms: shorter frames allow a higher quality
 const PATIENCE = 120; // number of short frames before a higher quality is tried
-const LONGEST = 100; // ms: upper limit of a frame time, because one slow frame does not mean a slow machine
+// ms: upper limit of a frame time, because one slow frame does not mean a slow machine
+const LONGEST = 100;
 const USUAL = 16; // ms: initial frame time
 
-// ratio: largest number of image pixels per page pixel; coarse: few triangles, and lighting of the water per vertex;
-// shadows: number of frames between two updates of the shadows
+// ratio: largest number of image pixels per page pixel; coarse: few triangles, and lighting of the
+// water per vertex; shadows: number of frames between two updates of the shadows
 export const LADDER = [
   { ratio: 1.5, coarse: false, shadows: 1 },
   { ratio: 1, coarse: false, shadows: 1 },
@@ -34,7 +36,11 @@ export function setDetail(scene, coarse) {
 /** True if there is no graphics card and the processor renders. */
 export function drawnBySoftware(gl) {
   const about = gl?.getExtension("WEBGL_debug_renderer_info");
-  return about ? /swiftshader|llvmpipe|software|basic render/i.test(gl.getParameter(about.UNMASKED_RENDERER_WEBGL)) : false;
+  return about
+    ? /swiftshader|llvmpipe|software|basic render/i.test(
+        gl.getParameter(about.UNMASKED_RENDERER_WEBGL),
+      )
+    : false;
 }
 
 /** The quality level for a moving picture, an index of LADDER. */

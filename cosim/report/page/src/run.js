@@ -8,14 +8,23 @@ async function inflated(base64) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/** Decode a column of `cosim/report/replay.py`: bytes of equal weight are grouped, and each row is the difference from the last. */
+/**
+ * Decode a column of `cosim/report/replay.py`: bytes of equal weight are grouped, and each row
+ * is the difference from the last.
+ */
 function column(bytes, rows, index) {
   const words = new Int32Array(rows);
   const start = 4 * rows * index;
   let word = 0;
   for (let i = 0; i < rows; i++) {
     const at = start + i;
-    word = (word + (bytes[at] | (bytes[at + rows] << 8) | (bytes[at + 2 * rows] << 16) | (bytes[at + 3 * rows] << 24))) | 0;
+    word =
+      (word +
+        (bytes[at] |
+          (bytes[at + rows] << 8) |
+          (bytes[at + 2 * rows] << 16) |
+          (bytes[at + 3 * rows] << 24))) |
+      0;
     words[i] = word;
   }
   return new Float32Array(words.buffer);
@@ -23,7 +32,12 @@ function column(bytes, rows, index) {
 
 export class Run {
   constructor(about, columns) {
-    Object.assign(this, { name: about.name, units: about.units, constants: about.constants, columns });
+    Object.assign(this, {
+      name: about.name,
+      units: about.units,
+      constants: about.constants,
+      columns,
+    });
     this.time = columns.get("time");
     this.first = this.time[0];
     this.last = this.time[this.time.length - 1];
@@ -31,7 +45,10 @@ export class Run {
 
   static async decoded(about) {
     const bytes = await inflated(about.samples);
-    return new Run(about, new Map(about.columns.map((name, i) => [name, column(bytes, about.rows, i)])));
+    return new Run(
+      about,
+      new Map(about.columns.map((name, i) => [name, column(bytes, about.rows, i)])),
+    );
   }
 
   /** Names of all signals, in recorded order. */
@@ -56,7 +73,11 @@ export class Run {
     }
     const next = Math.min(low + 1, this.time.length - 1);
     const step = this.time[next] - this.time[low];
-    return { row: low, next, share: step > 0 ? Math.min(Math.max((time - this.time[low]) / step, 0), 1) : 0 };
+    return {
+      row: low,
+      next,
+      share: step > 0 ? Math.min(Math.max((time - this.time[low]) / step, 0), 1) : 0,
+    };
   }
 
   /** Value in a row of a signal, of its negative ("-signal"), or of a constant number. */
@@ -77,7 +98,9 @@ export class Run {
   }
 
   knows(body) {
-    return [...body.position, ...(body.orientation ?? body.attitude)].every((name) => this.has(name));
+    return [...body.position, ...(body.orientation ?? body.attitude)].every((name) =>
+      this.has(name),
+    );
   }
 
   position(body, row) {

@@ -1,7 +1,10 @@
 // Simplification of a path to few points.
 import { Line3, Vector3 } from "three";
 
-/** Indices of the points of a simplified path with a deviation of at most `tolerance` (Douglas and Peucker 1973). */
+/**
+ * Indices of the points of a simplified path with a deviation of at most `tolerance` (Douglas
+ * and Peucker 1973).
+ */
 export function simplified(points, tolerance) {
   const kept = new Set([0, points.length - 1]);
   const spans = [[0, points.length - 1]];

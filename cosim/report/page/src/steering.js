@@ -1,11 +1,18 @@
-// Controls of a running simulation, beside those of the replay: single step, state, tunable parameters and unconnected inputs.
+// Controls of a running simulation, beside those of the replay: single step, state, tunable
+// parameters and unconnected inputs.
 import { offerSpeeds } from "./controls.js";
 
-const STATE = `<button type="button" class="step">Step</button><button type="button" class="state" title="Show the newest row"></button>`;
-const ADJUST = `<output class="answer" role="alert"></output><details class="adjust"><summary>Parameters and inputs</summary>
-  <input class="filter" placeholder="Filter" aria-label="Filter parameters and inputs" spellcheck="false"><div class="fields"></div></details>`;
+const STATE = `<button type="button" class="step">Step</button>
+  <button type="button" class="state" title="Show the newest row"></button>`;
+const ADJUST = `<output class="answer" role="alert"></output>
+  <details class="adjust"><summary>Parameters and inputs</summary>
+  <input class="filter" placeholder="Filter" aria-label="Filter parameters and inputs"
+    spellcheck="false"><div class="fields"></div></details>`;
 
-/** Return a function that sends a command, shows why it was refused, and returns true if it was carried out. */
+/**
+ * Return a function that sends a command, shows why it was refused, and returns true if it was
+ * carried out.
+ */
 export function commander(page, live) {
   return async (message) => {
     const { error } = await live.command(message);
@@ -21,7 +28,9 @@ export function steer(page, live, player, command) {
   const [step, state] = [".step", ".state"].map((selector) => page.bar.querySelector(selector));
   step.addEventListener("click", () => command({ command: "step" }));
   state.addEventListener("click", () => player.seek(player.last));
-  const fields = live.adjustable.map((about) => field(about, (value) => command({ command: "set", name: about.name, value })));
+  const fields = live.adjustable.map((about) =>
+    field(about, (value) => command({ command: "set", name: about.name, value })),
+  );
   page.root.querySelector(".fields").append(...fields);
   filtering(page.root.querySelector(".filter"), fields);
   const show = () => {
@@ -30,7 +39,9 @@ export function steer(page, live, player, command) {
     state.dataset.state = state.textContent;
     page.pace.textContent = page.speed.ariaLabel = ended ? "Replay speed" : "Run speed";
     offerSpeeds(page.speed, ended ? player.speed : speed, !ended);
-    if (ended) for (const control of [step, ...page.root.querySelectorAll(".fields input")]) control.disabled = true;
+    if (ended)
+      for (const control of [step, ...page.root.querySelectorAll(".fields input")])
+        control.disabled = true;
   };
   show();
   return show;
@@ -43,12 +54,19 @@ function filtering(input, fields) {
   });
 }
 
-/** Field of one value: a check box, a slider with a number if there are bounds, a number, or a text (lists as JSON). */
+/**
+ * Field of one value: a check box, a slider with a number if there are bounds, a number, or a
+ * text (lists as JSON).
+ */
 function field(about, set) {
   const label = document.createElement("label");
   label.dataset.name = about.name;
   label.title = about.description;
-  label.append(Object.assign(document.createElement("span"), { textContent: about.name + (about.unit ? ` (${about.unit})` : "") }));
+  label.append(
+    Object.assign(document.createElement("span"), {
+      textContent: about.name + (about.unit ? ` (${about.unit})` : ""),
+    }),
+  );
   const inputs = kindsOf(about).map((type) => label.appendChild(inputOf(about, type)));
   let last = about.value;
   const show = (value) => inputs.forEach((input) => put(input, value));
@@ -88,7 +106,8 @@ function put(input, value) {
 /** The value of a field, or undefined if it is invalid. */
 function taken(input, { value }) {
   if (input.type === "checkbox") return input.checked;
-  if (input.type !== "text") return Number.isFinite(input.valueAsNumber) ? input.valueAsNumber : undefined;
+  if (input.type !== "text")
+    return Number.isFinite(input.valueAsNumber) ? input.valueAsNumber : undefined;
   if (!Array.isArray(value)) return input.value;
   try {
     return JSON.parse(input.value);

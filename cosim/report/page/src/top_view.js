@@ -1,4 +1,5 @@
-// Paths of the bodies seen from above, with the waypoints and the present positions; one scale along both axes.
+// Paths of the bodies seen from above, with the waypoints and the present positions; one scale
+// along both axes.
 const LEAST = 0.2; // m: no view if no body moves farther
 const POINTS = 1500; // of a path
 const EDGE = { left: 46, right: 10, top: 8, bottom: 36 };
@@ -18,7 +19,9 @@ function pathOf(run, { position: [x, y] }) {
   const last = run.time.length - 1;
   const step = Math.ceil((last + 1) / POINTS);
   const rows = [...Array(Math.floor(last / step) + 1).keys()].map((i) => i * step);
-  return [...rows, last].map((row) => [run.at(x, row), run.at(y, row)]).filter((point) => point.every(Number.isFinite));
+  return [...rows, last]
+    .map((row) => [run.at(x, row), run.at(y, row)])
+    .filter((point) => point.every(Number.isFinite));
 }
 
 const extent = (values) => [Math.min(...values), Math.max(...values)];
@@ -32,7 +35,9 @@ function ticks(low, high, least) {
   const power = 10 ** Math.floor(Math.log10(least));
   const step = power * [1, 2, 5, 10].find((factor) => factor * power >= least);
   const first = Math.ceil(low / step);
-  return Array.from({ length: Math.floor(high / step) - first + 1 }, (_, i) => Number(((first + i) * step).toPrecision(10)));
+  return Array.from({ length: Math.floor(high / step) - first + 1 }, (_, i) =>
+    Number(((first + i) * step).toPrecision(10)),
+  );
 }
 
 /** Waypoints in the order of their numbers; each mission begins with number 1. */
@@ -64,8 +69,13 @@ export class TopView {
   /** Update after the runs have received more rows. */
   grow() {
     this.paths = this.runs.flatMap((run, number) =>
-      this.bodies.filter((body) => run.knows(body)).map((body) => ({ run, body, number, points: pathOf(run, body) })));
-    const moves = this.paths.some(({ points }) => points.length > 1 && Math.max(span(points, 0), span(points, 1)) > LEAST);
+      this.bodies
+        .filter((body) => run.knows(body))
+        .map((body) => ({ run, body, number, points: pathOf(run, body) })),
+    );
+    const moves = this.paths.some(
+      ({ points }) => points.length > 1 && Math.max(span(points, 0), span(points, 1)) > LEAST,
+    );
     if (moves && !this.element.isConnected) this.parent.prepend(this.element);
     this.draw();
   }
@@ -75,20 +85,37 @@ export class TopView {
     this.element.querySelector("svg")?.remove();
     this.#fit(Math.max(this.element.clientWidth, 200));
     this.element.classList.toggle("tall", this.height > TALL);
-    const svg = draw(this.element, "svg", { role: "img", "aria-label": "Paths seen from above", width: this.width, height: this.height });
+    const svg = draw(this.element, "svg", {
+      role: "img",
+      "aria-label": "Paths seen from above",
+      width: this.width,
+      height: this.height,
+    });
     this.#grid(svg);
     this.#waypoints(svg);
     for (const { body, number, points } of this.paths)
-      draw(svg, "polyline", { class: "path", points: this.#line(points), stroke: body.colour, "stroke-dasharray": number ? "5 4" : "none" });
-    this.dots = this.paths.map(({ body }) => draw(svg, "circle", { class: "present", r: 5, fill: body.colour }));
+      draw(svg, "polyline", {
+        class: "path",
+        points: this.#line(points),
+        stroke: body.colour,
+        "stroke-dasharray": number ? "5 4" : "none",
+      });
+    this.dots = this.paths.map(({ body }) =>
+      draw(svg, "circle", { class: "present", r: 5, fill: body.colour }),
+    );
     this.move();
   }
 
   /** Choose the scale (pixels per metre), the height and the middle (m). */
   #fit(width) {
-    const around = this.scene.markers.flatMap(({ position: [x, y], radius }) => [[x - radius, y - radius], [x + radius, y + radius]]);
+    const around = this.scene.markers.flatMap(({ position: [x, y], radius }) => [
+      [x - radius, y - radius],
+      [x + radius, y + radius],
+    ]);
     const points = [...this.paths.flatMap(({ points }) => points), ...around];
-    const [[west, east], [south, north]] = [0, 1].map((axis) => extent(points.map((point) => point[axis])));
+    const [[west, east], [south, north]] = [0, 1].map((axis) =>
+      extent(points.map((point) => point[axis])),
+    );
     const [inner, room] = [width - EDGE.left - EDGE.right, EDGE.top + EDGE.bottom];
     const [across, along] = [1.08 * (east - west) || 1, 1.08 * (north - south)];
     this.height = Math.min(Math.max(room + (inner * along) / across, HEIGHTS[0]), HEIGHTS[1]);
@@ -99,18 +126,33 @@ export class TopView {
 
   /** Pixels of a place (m). */
   #place([x, y]) {
-    return [this.centre[0] + this.scale * (x - this.middle[0]), this.centre[1] - this.scale * (y - this.middle[1])];
+    return [
+      this.centre[0] + this.scale * (x - this.middle[0]),
+      this.centre[1] - this.scale * (y - this.middle[1]),
+    ];
   }
 
   #line(points) {
-    return points.map((point) => this.#place(point).map((value) => value.toFixed(1)).join(",")).join(" ");
+    return points
+      .map((point) =>
+        this.#place(point)
+          .map((value) => value.toFixed(1))
+          .join(","),
+      )
+      .join(" ");
   }
 
   #grid(svg) {
     const { width, height, scale } = this;
     const [bottom, right] = [height - EDGE.bottom, width - EDGE.right];
-    const low = [this.middle[0] - (this.centre[0] - EDGE.left) / scale, this.middle[1] - (bottom - this.centre[1]) / scale];
-    const high = [this.middle[0] + (right - this.centre[0]) / scale, this.middle[1] + (this.centre[1] - EDGE.top) / scale];
+    const low = [
+      this.middle[0] - (this.centre[0] - EDGE.left) / scale,
+      this.middle[1] - (bottom - this.centre[1]) / scale,
+    ];
+    const high = [
+      this.middle[0] + (right - this.centre[0]) / scale,
+      this.middle[1] + (this.centre[1] - EDGE.top) / scale,
+    ];
     for (const x of ticks(low[0], high[0], TICKS / scale)) {
       const [at] = this.#place([x, 0]);
       draw(svg, "line", { x1: at, x2: at, y1: EDGE.top, y2: bottom });
@@ -121,12 +163,26 @@ export class TopView {
       draw(svg, "line", { x1: EDGE.left, x2: right, y1: at, y2: at });
       draw(svg, "text", { x: EDGE.left - 6, y: at + 4, "text-anchor": "end" }, String(y));
     }
-    draw(svg, "text", { x: (EDGE.left + right) / 2, y: height - 4, "text-anchor": "middle" }, "x, east (m)");
-    draw(svg, "text", { "text-anchor": "middle", transform: `translate(11 ${(EDGE.top + bottom) / 2}) rotate(-90)` }, "y, north (m)");
+    draw(
+      svg,
+      "text",
+      { x: (EDGE.left + right) / 2, y: height - 4, "text-anchor": "middle" },
+      "x, east (m)",
+    );
+    draw(
+      svg,
+      "text",
+      {
+        "text-anchor": "middle",
+        transform: `translate(11 ${(EDGE.top + bottom) / 2}) rotate(-90)`,
+      },
+      "y, north (m)",
+    );
   }
 
   #waypoints(svg) {
-    for (const places of missions(this.scene.markers)) draw(svg, "polyline", { class: "mission", points: this.#line(places) });
+    for (const places of missions(this.scene.markers))
+      draw(svg, "polyline", { class: "mission", points: this.#line(places) });
     for (const { position, radius, label } of this.scene.markers) {
       const [cx, cy] = this.#place(position);
       const r = Math.max(2, this.scale * radius);

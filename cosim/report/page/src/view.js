@@ -1,7 +1,19 @@
-// The scene: light, sky, water, bodies with their trails, and the camera; rendered only after a change.
+// The scene: light, sky, water, bodies with their trails, and the camera; rendered only after a
+// change.
 import {
-  BasicShadowMap, Color, ColorManagement, DirectionalLight, Euler, Group, HemisphereLight, LinearSRGBColorSpace, MeshLambertMaterial,
-  PCFShadowMap, Scene, Sphere, WebGLRenderer,
+  BasicShadowMap,
+  Color,
+  ColorManagement,
+  DirectionalLight,
+  Euler,
+  Group,
+  HemisphereLight,
+  LinearSRGBColorSpace,
+  MeshLambertMaterial,
+  PCFShadowMap,
+  Scene,
+  Sphere,
+  WebGLRenderer,
 } from "three";
 import { Backdrop } from "./backdrop.js";
 import { bodyOf, reachOf } from "./bodies.js";
@@ -17,7 +29,8 @@ const REST = 350; // ms without a change until the picture is rendered at the hi
 const OTHER = "#c2185b";
 const LOWEST = -3; // m; what sinks below this height does not count for the camera
 
-ColorManagement.enabled = false; // blend colours without conversion, which is slow in software rendering
+// blend colours without conversion, which is slow in software rendering
+ColorManagement.enabled = false;
 
 /** Create a renderer with an opaque canvas; `software` is true if the processor renders. */
 function rendererOn(canvas) {
@@ -42,13 +55,27 @@ export class View {
     Object.assign(this, { runs, marks: scene.marks, time: runs[0].first });
     this.scene = new Scene();
     const { renderer, software } = rendererOn(canvas);
-    const most = software ? Infinity : devicePixelRatio; // smaller pixels smooth edges; a graphics card does that at a lower cost
-    Object.assign(this, { renderer, quality: new Quality(software), most, shown: null, frames: 0, changed: 0 });
+    // smaller pixels smooth edges; a graphics card does that at a lower cost
+    const most = software ? Infinity : devicePixelRatio;
+    Object.assign(this, {
+      renderer,
+      quality: new Quality(software),
+      most,
+      shown: null,
+      frames: 0,
+      changed: 0,
+    });
     this.#surroundings(scene);
-    this.actors = runs.flatMap((run, i) => scene.bodies.filter((body) => run.knows(body)).map((body) => this.#actor(run, body, i > 0)));
+    this.actors = runs.flatMap((run, i) =>
+      scene.bodies.filter((body) => run.knows(body)).map((body) => this.#actor(run, body, i > 0)),
+    );
     this.own = this.actors.filter((actor) => actor.run === runs[0]);
     this.subject = this.own[0];
-    this.cameras = new Cameras(canvas, this.#box(), Object.fromEntries(scene.views.map((view) => [view.name, view])));
+    this.cameras = new Cameras(
+      canvas,
+      this.#box(),
+      Object.fromEntries(scene.views.map((view) => [view.name, view])),
+    );
     this.backdrop = this.water && new Backdrop(this.cameras.centre, this.cameras.size / 2);
     if (this.backdrop) this.scene.add(this.backdrop.object);
     this.cameras.controls.addEventListener("change", () => this.request());
@@ -61,7 +88,14 @@ export class View {
     this.light = new DirectionalLight("#fff6e8", 2);
     this.light.castShadow = true;
     this.light.shadow.mapSize.setScalar(1024);
-    Object.assign(this.light.shadow.camera, { left: -2.5, right: 2.5, top: 2.5, bottom: -2.5, near: 0.1, far: 24 });
+    Object.assign(this.light.shadow.camera, {
+      left: -2.5,
+      right: 2.5,
+      top: 2.5,
+      bottom: -2.5,
+      near: 0.1,
+      far: 24,
+    });
     this.light.shadow.bias = -1e-3;
     this.light.shadow.normalBias = 0.01;
     this.around = new HemisphereLight("#ffffff", "#8fb0b8", 1.5);
@@ -77,7 +111,17 @@ export class View {
     if (isOther) this.#veil(object);
     const reach = reachOf(body.parts);
     this.scene.add(object);
-    const actor = { run, body, object, solid: parts.solid, isOther, reach, get position() { return object.position; } };
+    const actor = {
+      run,
+      body,
+      object,
+      solid: parts.solid,
+      isOther,
+      reach,
+      get position() {
+        return object.position;
+      },
+    };
     return Object.assign(actor, this.#past(actor));
   }
 
@@ -87,11 +131,18 @@ export class View {
     const trail = new Trail(run, body, isOther ? OTHER : body.colour, isOther, end);
     const ghosts = isOther || !solid ? null : new Ghosts(run, body, solid);
     const crosses = marks.map((mark) => new Cross(mark, run.position(body, mark.row)));
-    this.scene.add(...trail.lines.map(asSign), ...(ghosts ? [ghosts.mesh] : []), ...crosses.map((cross) => asSign(cross.object)));
+    this.scene.add(
+      ...trail.lines.map(asSign),
+      ...(ghosts ? [ghosts.mesh] : []),
+      ...crosses.map((cross) => asSign(cross.object)),
+    );
     return { trail, ghosts, crosses, end };
   }
 
-  /** The box around all bodies until they are marked (a crash), without what is far below the water or far away for a short time. */
+  /**
+   * The box around all bodies until they are marked (a crash), without what is far below the
+   * water or far away for a short time.
+   */
   #box() {
     const places = this.own.flatMap(({ run, body, end }) => {
       const rows = run.place(end).row;
@@ -107,8 +158,12 @@ export class View {
 
   /** The sphere around all vehicles now. */
   #group() {
-    const places = withoutOutliers(this.own.map(({ position }) => position).filter((place) => this.#counts(place)));
-    const around = boxAround(places.length ? places : [this.subject.position]).getBoundingSphere(new Sphere());
+    const places = withoutOutliers(
+      this.own.map(({ position }) => position).filter((place) => this.#counts(place)),
+    );
+    const around = boxAround(places.length ? places : [this.subject.position]).getBoundingSphere(
+      new Sphere(),
+    );
     around.radius += Math.max(...this.own.map(({ reach }) => reach));
     return around;
   }
@@ -117,7 +172,11 @@ export class View {
   grow() {
     for (const actor of this.actors) {
       const { trail, ghosts, crosses } = actor;
-      this.scene.remove(...trail.lines, ...(ghosts ? [ghosts.mesh] : []), ...crosses.map((cross) => cross.object));
+      this.scene.remove(
+        ...trail.lines,
+        ...(ghosts ? [ghosts.mesh] : []),
+        ...crosses.map((cross) => cross.object),
+      );
       Object.assign(actor, this.#past(actor));
       for (const line of actor.trail.lines) line.visible = trail.whole.visible;
       if (ghosts) actor.ghosts.mesh.visible = ghosts.mesh.visible;
@@ -135,7 +194,12 @@ export class View {
     object.traverse((mesh) => {
       if (!mesh.isMesh) return;
       mesh.castShadow = false;
-      mesh.material = new MeshLambertMaterial({ color: OTHER, transparent: true, opacity: 0.5, depthWrite: false });
+      mesh.material = new MeshLambertMaterial({
+        color: OTHER,
+        transparent: true,
+        opacity: 0.5,
+        depthWrite: false,
+      });
     });
   }
 
@@ -189,7 +253,12 @@ export class View {
   #mounted() {
     const view = this.cameras.views[this.cameras.mode];
     const actor = view && this.own.find(({ body }) => body.name === view.on);
-    return actor && { position: actor.position, yaw: new Euler().setFromQuaternion(actor.object.quaternion, "ZYX").z };
+    return (
+      actor && {
+        position: actor.position,
+        yaw: new Euler().setFromQuaternion(actor.object.quaternion, "ZYX").z,
+      }
+    );
   }
 
   #moveWater(time) {
@@ -210,7 +279,10 @@ export class View {
     this.stale = true;
   }
 
-  /** Render at the wall time `now` (ms) after a change; `elapsed` is the time since the last frame (ms) if the replay is playing. */
+  /**
+   * Render at the wall time `now` (ms) after a change; `elapsed` is the time since the last
+   * frame (ms) if the replay is playing.
+   */
   draw(now, elapsed) {
     if (this.stale) {
       this.stale = false;

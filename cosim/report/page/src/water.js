@@ -1,7 +1,18 @@
-// Water as one plane, displaced by the waves of the run, with ripples, a mirror image and soft shadows of vehicles.
+// Water as one plane, displaced by the waves of the run, with ripples, a mirror image and soft
+// shadows of vehicles.
 import {
-  BufferAttribute, BufferGeometry, Color, CustomBlending, Group, InstancedBufferAttribute, InstancedBufferGeometry, Mesh, PlaneGeometry,
-  ShaderMaterial, Vector2, Vector4,
+  BufferAttribute,
+  BufferGeometry,
+  Color,
+  CustomBlending,
+  Group,
+  InstancedBufferAttribute,
+  InstancedBufferGeometry,
+  Mesh,
+  PlaneGeometry,
+  ShaderMaterial,
+  Vector2,
+  Vector4,
 } from "three";
 import { Reflector } from "three/addons/objects/Reflector.js";
 import { detailed } from "./quality.js";
@@ -11,7 +22,8 @@ import { FINE, MOST_WAVES, SHADE, WATER } from "./water_shaders.js";
 const MOST_SHADES = 16;
 const REACH = 600; // m from the centre
 const IMAGE = { textureWidth: 1024, textureHeight: 512, multisample: 0 }; // of the mirror image
-const CELLS = { calm: [64, 32], waves: [160, 60] }; // number of cells along each side, fine and coarse
+// number of cells along each side, fine and coarse
+const CELLS = { calm: [64, 32], waves: [160, 60] };
 
 /** A square mesh that is finer in its middle. */
 function mesh(count) {
@@ -34,9 +46,15 @@ function mesh(count) {
 /** Soft shadows of vehicles: patches that are drawn on the water before everything else. */
 function shades(uniforms) {
   const patch = new PlaneGeometry(2, 2, 4, 4);
-  const geometry = new InstancedBufferGeometry().setIndex(patch.index).setAttribute("position", patch.attributes.position);
-  geometry.setAttribute("shade", new InstancedBufferAttribute(new Float32Array(4 * MOST_SHADES), 4));
-  const blended = { blending: CustomBlending, depthTest: false, depthWrite: false }; // not `transparent`, which would be drawn last
+  const geometry = new InstancedBufferGeometry()
+    .setIndex(patch.index)
+    .setAttribute("position", patch.attributes.position);
+  geometry.setAttribute(
+    "shade",
+    new InstancedBufferAttribute(new Float32Array(4 * MOST_SHADES), 4),
+  );
+  // not `transparent`, which would be drawn last
+  const blended = { blending: CustomBlending, depthTest: false, depthWrite: false };
   return new Mesh(geometry, new ShaderMaterial({ uniforms, ...SHADE, ...blended }));
 }
 
@@ -45,20 +63,35 @@ export class Water {
     this.waves = spec.waves;
     this.gain = spec.gain;
     this.uniforms = {
-      waves: { value: Array.from({ length: MOST_WAVES }, () => new Vector4()) }, count: { value: 0 },
-      centre: { value: new Vector2() }, time: { value: 0 }, sun: { value: SUN }, strength: { value: 0 },
-      deep: { value: new Color() }, zenith: { value: new Color() }, horizon: { value: new Color() },
+      waves: { value: Array.from({ length: MOST_WAVES }, () => new Vector4()) },
+      count: { value: 0 },
+      centre: { value: new Vector2() },
+      time: { value: 0 },
+      sun: { value: SUN },
+      strength: { value: 0 },
+      deep: { value: new Color() },
+      zenith: { value: new Color() },
+      horizon: { value: new Color() },
     };
     const [fine, coarse] = spec.waves.length ? CELLS.waves : CELLS.calm;
     this.surface = detailed(this.#mirror(), mesh(fine), mesh(coarse));
     this.shades = shades(this.uniforms);
     this.object = new Group().add(this.surface, this.shades);
-    this.object.children.forEach((child, i) => Object.assign(child, { frustumCulled: false, renderOrder: i - 2 }));
+    this.object.children.forEach((child, i) =>
+      Object.assign(child, { frustumCulled: false, renderOrder: i - 2 }),
+    );
   }
 
-  /** A surface that draws the mirror image of layer 0 before it is drawn itself; it shares the uniforms of the shadows. */
+  /**
+   * A surface that draws the mirror image of layer 0 before it is drawn itself; it shares the
+   * uniforms of the shadows.
+   */
   #mirror() {
-    const images = { color: { value: null }, tDiffuse: { value: null }, textureMatrix: { value: null } };
+    const images = {
+      color: { value: null },
+      tDiffuse: { value: null },
+      textureMatrix: { value: null },
+    };
     const surface = new Reflector(undefined, { ...IMAGE, shader: { uniforms: images, ...WATER } });
     Object.assign(surface.material.uniforms, this.uniforms);
     this.reflect = surface.onBeforeRender;
@@ -90,7 +123,12 @@ export class Water {
     const list = this.uniforms.waves.value;
     this.waves.forEach((wave, i) => {
       const phase = (wave.phase - wave.frequency * time) % (2 * Math.PI);
-      list[i].set(gain * wave.amplitude, wave.number * Math.cos(wave.direction), wave.number * Math.sin(wave.direction), phase);
+      list[i].set(
+        gain * wave.amplitude,
+        wave.number * Math.cos(wave.direction),
+        wave.number * Math.sin(wave.direction),
+        phase,
+      );
     });
     this.uniforms.count.value = gain ? Math.min(this.waves.length, MOST_WAVES) : 0;
     this.uniforms.time.value = time % 1000;
@@ -113,6 +151,8 @@ export class Water {
   /** Height of the water at a position (m). */
   height(x, y) {
     const { waves, count } = this.uniforms;
-    return waves.value.slice(0, count.value).reduce((sum, w) => sum + w.x * Math.cos(w.y * x + w.z * y + w.w), 0);
+    return waves.value
+      .slice(0, count.value)
+      .reduce((sum, w) => sum + w.x * Math.cos(w.y * x + w.z * y + w.w), 0);
   }
 }

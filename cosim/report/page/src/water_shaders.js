@@ -16,7 +16,8 @@ vec3 surface(vec2 at, out vec2 slope) {
   float fade = 1.0 - smoothstep(${FINE}.0, ${2 * FINE}.0, distance(at, centre));
   int felt = fade > 0.0 ? count : 0;
   float height = 0.0;
-  slope = ripple(at, vec2(1.7, 0.8), 1.1 * time) + ripple(at, vec2(-0.9, 2.1), -1.4 * time) + ripple(at, vec2(2.3, -1.9), 1.8 * time);
+  slope = ripple(at, vec2(1.7, 0.8), 1.1 * time) + ripple(at, vec2(-0.9, 2.1), -1.4 * time)
+    + ripple(at, vec2(2.3, -1.9), 1.8 * time);
   for (int i = 0; i < felt; i++) {
     float angle = dot(waves[i].yz, at) + waves[i].w;
     height += waves[i].x * cos(angle);
@@ -48,8 +49,8 @@ vec3 sky(vec3 ray, vec3 normal) {
   return mix(horizon, zenith, sqrt(height));
 }`;
 
-// COARSE: the water is lit per vertex and mirrors the sky alone. Otherwise it is lit per pixel, has finer ripples and mirrors the
-// scene (three's Reflector draws it into tDiffuse).
+// COARSE: the water is lit per vertex and mirrors the sky alone. Otherwise it is lit per pixel, has
+// finer ripples and mirrors the scene (three's Reflector draws it into tDiffuse).
 export const WATER = {
   vertexShader: `${SURFACE}
 uniform mat4 textureMatrix;
@@ -93,7 +94,8 @@ vec2 ripple(vec2 number, float angle) {
   return number * (0.012 * cos(dot(number, place.xy) + angle) / length(number));
 }
 vec2 ripples() {
-  return ripple(vec2(4.1, 2.3), 2.1 * time) + ripple(vec2(-3.3, 5.6), -2.6 * time) + ripple(vec2(7.9, -6.1), 3.3 * time)
+  return ripple(vec2(4.1, 2.3), 2.1 * time) + ripple(vec2(-3.3, 5.6), -2.6 * time)
+    + ripple(vec2(7.9, -6.1), 3.3 * time)
     + ripple(vec2(-9.7, -8.8), 3.9 * time) + ripple(vec2(1.3, 11.9), -3.6 * time);
 }
 void main() {

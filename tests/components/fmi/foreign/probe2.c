@@ -1,6 +1,7 @@
-/* A foreign FMI 2.0 FMU, written by hand: a lag, a copy of each type, and failures on demand.
-   Value references: 0 u, 1 y (y' = (u - y) / 0.5 s, one Euler step per doStep), 2 y_start, 3 fail_time (Real);
-   0 i_in, 1 i_out, 2 e_in, 3 e_out, 4 fail_status (Integer); 0 b_in, 1 b_out (Boolean); 0 s_in, 1 s_out (String). */
+/* A foreign FMI 2.0 FMU, written by hand: a lag, a copy of each type, and failures on demand. Value
+   references: 0 u, 1 y (y' = (u - y) / 0.5 s, one Euler step per doStep), 2 y_start, 3 fail_time
+   (Real); 0 i_in, 1 i_out, 2 e_in, 3 e_out, 4 fail_status (Integer); 0 b_in, 1 b_out (Boolean); 0
+   s_in, 1 s_out (String). */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,10 +19,14 @@ typedef struct {
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char *fmi2GetVersion(void) { return "2.0"; }
-fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String names[]) { return fmi2OK; }
+fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n,
+                               const fmi2String names[]) {
+    return fmi2OK;
+}
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
-                              const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging) {
+                              const fmi2CallbackFunctions *callbacks, fmi2Boolean visible,
+                              fmi2Boolean logging) {
     if (*guid && strcmp(guid, "probe")) {
         callbacks->logger(callbacks->componentEnvironment, name, fmi2Error, "error", "wrong GUID");
         return NULL;
@@ -40,7 +45,8 @@ void fmi2FreeInstance(fmi2Component c) {
         m->callbacks->logger(m->callbacks->componentEnvironment, m->name, fmi2OK, "info", "freed");
     free(c);
 }
-fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean td, fmi2Real t, fmi2Real start, fmi2Boolean sd, fmi2Real stop) {
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean td, fmi2Real t, fmi2Real start,
+                               fmi2Boolean sd, fmi2Real stop) {
     ((Probe *)c)->time = start;
     return fmi2OK;
 }
@@ -53,17 +59,19 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
 fmi2Status fmi2Terminate(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2Reset(fmi2Component c) { return fmi2OK; }
 
-#define ACCESS(TYPE, MEMBER, COUNT)                                                                                       \
-    fmi2Status fmi2Get##TYPE(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2##TYPE v[]) {                  \
-        for (size_t k = 0; k < n; k++) {                                                                                  \
-            if (vr[k] >= COUNT) return fmi2Error;                                                                         \
-            v[k] = ((Probe *)c)->MEMBER[vr[k]];                                                                           \
-        }                                                                                                                 \
-        return fmi2OK;                                                                                                    \
-    }                                                                                                                     \
-    fmi2Status fmi2Set##TYPE(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2##TYPE v[]) {            \
-        for (size_t k = 0; k < n; k++) ((Probe *)c)->MEMBER[vr[k]] = v[k];                                                \
-        return fmi2OK;                                                                                                    \
+#define ACCESS(TYPE, MEMBER, COUNT) \
+    fmi2Status fmi2Get##TYPE(fmi2Component c, const fmi2ValueReference vr[], size_t n, \
+                             fmi2##TYPE v[]) { \
+        for (size_t k = 0; k < n; k++) { \
+            if (vr[k] >= COUNT) return fmi2Error; \
+            v[k] = ((Probe *)c)->MEMBER[vr[k]]; \
+        } \
+        return fmi2OK; \
+    } \
+    fmi2Status fmi2Set##TYPE(fmi2Component c, const fmi2ValueReference vr[], size_t n, \
+                             const fmi2##TYPE v[]) { \
+        for (size_t k = 0; k < n; k++) ((Probe *)c)->MEMBER[vr[k]] = v[k]; \
+        return fmi2OK; \
     }
 ACCESS(Real, r, 4)
 ACCESS(Integer, i, 5)
@@ -73,7 +81,8 @@ fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     for (size_t k = 0; k < n; k++) v[k] = ((Probe *)c)->s[vr[k]];
     return fmi2OK;
 }
-fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2String v[]) {
+fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                         const fmi2String v[]) {
     for (size_t k = 0; k < n; k++) snprintf(((Probe *)c)->s[vr[k]], 64, "%s", v[k]);
     return fmi2OK;
 }
@@ -81,8 +90,8 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_set_state) {
     Probe *m = c;
     if (t + h > m->r[3]) {
-        m->callbacks->logger(m->callbacks->componentEnvironment, m->name, (fmi2Status)m->i[4], "error",
-                             "told to fail, %d%s%s sure, %.1f s", 100, "%", "s", t);
+        m->callbacks->logger(m->callbacks->componentEnvironment, m->name, (fmi2Status)m->i[4],
+                             "error", "told to fail, %d%s%s sure, %.1f s", 100, "%", "s", t);
         return (fmi2Status)m->i[4];
     }
     m->r[1] += h * (m->r[0] - m->r[1]) / 0.5;
@@ -94,17 +103,24 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_se
     return fmi2OK;
 }
 fmi2Status fmi2CancelStep(fmi2Component c) { return fmi2Error; }
-fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind k, fmi2Status *v) { return fmi2Discard; }
+fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind k, fmi2Status *v) {
+    return fmi2Discard;
+}
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind k, fmi2Real *v) {
     *v = ((Probe *)c)->time;
     return fmi2OK;
 }
-fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind k, fmi2Integer *v) { return fmi2Discard; }
+fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind k, fmi2Integer *v) {
+    return fmi2Discard;
+}
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind k, fmi2Boolean *v) {
-    *v = ((Probe *)c)->i[0] == 7; /* i_in = 7 means: discard is meant as the end of the simulation */
+    /* i_in = 7 means: discard is meant as the end of the simulation */
+    *v = ((Probe *)c)->i[0] == 7;
     return fmi2OK;
 }
-fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind k, fmi2String *v) { return fmi2Discard; }
+fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind k, fmi2String *v) {
+    return fmi2Discard;
+}
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *s) {
     if (!*s) *s = malloc(sizeof(Probe));
@@ -120,12 +136,25 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *s) {
     *s = NULL;
     return fmi2OK;
 }
-fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate s, size_t *n) { return fmi2Error; }
-fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate s, fmi2Byte b[], size_t n) { return fmi2Error; }
-fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte b[], size_t n, fmi2FMUstate *s) { return fmi2Error; }
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference u[], size_t nu, const fmi2ValueReference k[],
-                                        size_t nk, const fmi2Real d[], fmi2Real o[]) { return fmi2Error; }
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference v[], size_t n, const fmi2Integer o[],
-                                       const fmi2Real x[]) { return fmi2Error; }
-fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference v[], size_t n, const fmi2Integer o[],
-                                        fmi2Real x[]) { return fmi2Error; }
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate s, size_t *n) {
+    return fmi2Error;
+}
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate s, fmi2Byte b[], size_t n) {
+    return fmi2Error;
+}
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte b[], size_t n, fmi2FMUstate *s) {
+    return fmi2Error;
+}
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference u[], size_t nu,
+                                        const fmi2ValueReference k[], size_t nk, const fmi2Real d[],
+                                        fmi2Real o[]) {
+    return fmi2Error;
+}
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference v[], size_t n,
+                                       const fmi2Integer o[], const fmi2Real x[]) {
+    return fmi2Error;
+}
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference v[], size_t n,
+                                        const fmi2Integer o[], fmi2Real x[]) {
+    return fmi2Error;
+}

@@ -226,7 +226,10 @@ def test_no_network_connection_is_made(prolog, good, tmp_path):
 )
 def test_other_xml_files_are_checked_too(member, good, tmp_path):
     path = tmp_path / "bad.fmu"
-    xml = b'<!DOCTYPE x [<!ENTITY e SYSTEM "file:///etc/passwd">]><fmiBuildDescription>&e;</fmiBuildDescription>'
+    xml = (
+        b'<!DOCTYPE x [<!ENTITY e SYSTEM "file:///etc/passwd">]>'
+        b"<fmiBuildDescription>&e;</fmiBuildDescription>"
+    )
     path.write_bytes(pack_archive(members(good[3] | {member: xml})))
     (finding,) = find_problems(path)
     assert (finding.rule, finding.location) == ("xml.doctype", f"{member}:1")

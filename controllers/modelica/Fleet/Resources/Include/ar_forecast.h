@@ -13,7 +13,8 @@ typedef struct {
     double forecast[AR_STEPS], pending[AR_STEPS];
 } ArState;
 
-/* Updates the model by the sample u and forecasts the next AR_STEPS samples. Without motion nothing is forgotten. */
+/* Updates the model by the sample u and forecasts the next AR_STEPS samples. Without motion nothing
+   is forgotten. */
 static void ar_update(const double *previous, double u, double forgetting, double *next)
 {
     ArState s;
@@ -29,7 +30,8 @@ static void ar_update(const double *previous, double u, double forgetting, doubl
     for (int i = 0; i < AR_ORDER; i++) {
         s.weight[i] += gain[i] * residual / (memory + scale);
         for (int j = 0; j < AR_ORDER; j++)
-            s.covariance[i][j] = (s.covariance[i][j] - gain[i] * gain[j] / (memory + scale)) / memory;
+            s.covariance[i][j] =
+                (s.covariance[i][j] - gain[i] * gain[j] / (memory + scale)) / memory;
     }
     memmove(s.past + 1, s.past, (AR_ORDER - 1) * sizeof *s.past);
     s.past[0] = u;

@@ -45,14 +45,17 @@ block DeckFollower "Quadcopter controller that flies above the deck; SI units, a
   parameter Real inertia_xy(unit = "kg.m2") = 0.00283 "About the axes forward and left";
   parameter Real inertia_z(unit = "kg.m2") = 0.005131;
   parameter Real arm(unit = "m") = 0.1815;
-  parameter Real torque_per_thrust(unit = "m") = 0.0289 "Reaction torque of a rotor over its thrust";
-  parameter Real thrust_coefficient(unit = "N.s2/rad2") = 8.24e-6 "Thrust of a rotor over its squared speed";
+  parameter Real torque_per_thrust(unit = "m") = 0.0289
+    "Reaction torque of a rotor over its thrust";
+  parameter Real thrust_coefficient(unit = "N.s2/rad2") = 8.24e-6
+    "Thrust of a rotor over its squared speed";
   parameter Real rotor_speed_limit(unit = "rad/s") = 523.6;
   input Vehicle vehicle;
   input Target target;
   input Real altitude_command(unit = "m", start = 2);
   input Real yaw_command(unit = "rad") "Counter-clockwise from east";
-  output Real rotor_speed[4](each start = 0, each fixed = true, each unit = "rad/s") "Front, left, rear, right";
+  output Real rotor_speed[4](each start = 0, each fixed = true, each unit = "rad/s")
+    "Front, left, rear, right";
 protected
   Real east(unit = "m/s2") "Commanded acceleration";
   Real north(unit = "m/s2");
@@ -67,23 +70,31 @@ protected
   Real thrusts[4](each unit = "N");
 equation
   // Position: critically damped control.
-  east = max(-acceleration_limit, min(acceleration_limit, position_bandwidth^2 * (target.position.x - vehicle.position.x)
+  east = max(-acceleration_limit, min(acceleration_limit,
+    position_bandwidth^2 * (target.position.x - vehicle.position.x)
     + 2 * position_bandwidth * (target.velocity.x - vehicle.velocity.x)));
-  north = max(-acceleration_limit, min(acceleration_limit, position_bandwidth^2 * (target.position.y - vehicle.position.y)
+  north = max(-acceleration_limit, min(acceleration_limit,
+    position_bandwidth^2 * (target.position.y - vehicle.position.y)
     + 2 * position_bandwidth * (target.velocity.y - vehicle.velocity.y)));
-  up = max(-acceleration_limit, min(acceleration_limit, position_bandwidth^2 * (altitude_command - vehicle.position.z)
+  up = max(-acceleration_limit, min(acceleration_limit,
+    position_bandwidth^2 * (altitude_command - vehicle.position.z)
     - 2 * position_bandwidth * vehicle.velocity.z));
 
-  // Tilt of the thrust: a positive pitch angle lowers the nose, a positive roll angle raises the left side.
+  // Tilt of the thrust: a positive pitch angle lowers the nose, a positive roll angle raises the
+  // left side.
   pitch = atan2(east * cos(vehicle.attitude.yaw) + north * sin(vehicle.attitude.yaw), gravity);
   roll = -atan2(north * cos(vehicle.attitude.yaw) - east * sin(vehicle.attitude.yaw), gravity);
-  thrust = mass * (gravity + up) / max(0.5, cos(vehicle.attitude.roll) * cos(vehicle.attitude.pitch));
+  thrust = mass * (gravity + up)
+    / max(0.5, cos(vehicle.attitude.roll) * cos(vehicle.attitude.pitch));
 
   // Attitude: control with a damping ratio of 0.8.
   turn = atan2(sin(yaw_command - vehicle.attitude.yaw), cos(yaw_command - vehicle.attitude.yaw));
-  x = inertia_xy * (attitude_bandwidth^2 * (roll - vehicle.attitude.roll) - 1.6 * attitude_bandwidth * vehicle.rates.p) / (2 * arm);
-  y = inertia_xy * (attitude_bandwidth^2 * (pitch - vehicle.attitude.pitch) - 1.6 * attitude_bandwidth * vehicle.rates.q) / (2 * arm);
-  z = inertia_z * (yaw_bandwidth^2 * turn - 1.6 * yaw_bandwidth * vehicle.rates.r) / (4 * torque_per_thrust);
+  x = inertia_xy * (attitude_bandwidth^2 * (roll - vehicle.attitude.roll)
+    - 1.6 * attitude_bandwidth * vehicle.rates.p) / (2 * arm);
+  y = inertia_xy * (attitude_bandwidth^2 * (pitch - vehicle.attitude.pitch)
+    - 1.6 * attitude_bandwidth * vehicle.rates.q) / (2 * arm);
+  z = inertia_z * (yaw_bandwidth^2 * turn
+    - 1.6 * yaw_bandwidth * vehicle.rates.r) / (4 * torque_per_thrust);
 
   // Front and rear rotor turn the body counter-clockwise by their reaction torques.
   thrusts = {thrust / 4 - y + z, thrust / 4 + x - z, thrust / 4 + y + z, thrust / 4 - x - z};

@@ -1,7 +1,8 @@
 /* Vessel autopilot in C with the headers of FMI 2.0: it passes waypoints at a speed.
 
-   Thrust: PI control of the speed error; the integral is held while the thrust is at its limit. Rudder angle: PD control of the
-   course to the next waypoint. After the last waypoint the thrust is zero. SI units, angles in rad, yaw counter-clockwise. */
+   Thrust: PI control of the speed error; the integral is held while the thrust is at its limit.
+   Rudder angle: PD control of the course to the next waypoint. After the last waypoint the thrust
+   is zero. SI units, angles in rad, yaw counter-clockwise. */
 
 #include <math.h>
 
@@ -24,7 +25,8 @@ static const double START[VARIABLES] = {
 
 static double clamp(double value, double limit) { return fmax(-limit, fmin(limit, value)); }
 
-/* Computes the outputs from the measurements at the start of a step; they are constant until its end. */
+/* Computes the outputs from the measurements at the start of a step; they are constant until its
+   end. */
 static void control(double *v, double step_size)
 {
     int next = (int)v[REACHED], count = (int)fmin(v[WAYPOINT_COUNT], 32.0);
@@ -41,7 +43,8 @@ static void control(double *v, double step_size)
     /* A positive rudder angle turns the bow to starboard and reduces the yaw angle. */
     double course_error = v[YAW] - atan2(north, east);
     course_error = atan2(sin(course_error), cos(course_error));
-    v[RUDDER_ANGLE] = clamp(v[COURSE_P] * course_error + v[COURSE_D] * v[YAW_RATE], v[RUDDER_LIMIT]);
+    v[RUDDER_ANGLE] =
+        clamp(v[COURSE_P] * course_error + v[COURSE_D] * v[YAW_RATE], v[RUDDER_LIMIT]);
 }
 
 #include "fmi2_block.h"

@@ -1,4 +1,5 @@
-block WaypointFollower "Vessel autopilot along waypoints; SI units, angles in rad, yaw counter-clockwise from east"
+block WaypointFollower
+  "Vessel autopilot along waypoints; SI units, angles in rad, yaw counter-clockwise from east"
   record Position
     Real x(unit = "m") "East";
     Real y(unit = "m") "North";
@@ -43,7 +44,8 @@ protected
   discrete Real east(start = 0, fixed = true, unit = "m") "To the next waypoint";
   discrete Real north(start = 0, fixed = true, unit = "m");
   discrete Real speed_error(start = 0, fixed = true, unit = "m/s");
-  discrete Real speed_integral(start = 0, fixed = true, unit = "N") "Constant while the thrust is at its limit";
+  discrete Real speed_integral(start = 0, fixed = true, unit = "N")
+    "Constant while the thrust is at its limit";
   discrete Real demand(start = 0, fixed = true, unit = "N") "Thrust without limit";
   discrete Real course_error(start = 0, fixed = true, unit = "rad");
 algorithm
@@ -61,7 +63,8 @@ algorithm
       // A positive rudder angle reduces the yaw angle, hence measurement minus command.
       course_error := vehicle.attitude.yaw - atan2(north, east);
       course_error := atan2(sin(course_error), cos(course_error));
-      rudder_angle := max(-rudder_limit, min(rudder_limit, course_P * course_error + course_D * vehicle.rates.r));
+      rudder_angle := max(-rudder_limit,
+        min(rudder_limit, course_P * course_error + course_D * vehicle.rates.r));
     else
       thrust := 0;
       rudder_angle := 0;

@@ -1,4 +1,5 @@
-block SpeedPid "Speed loop of a vessel around the PID controller of the Modelica Standard Library; SI units"
+block SpeedPid
+  "Speed loop of a vessel around the PID controller of the Modelica Standard Library; SI units"
   record BodyVelocity
     Real u(unit = "m/s") "Forward";
   end BodyVelocity;

@@ -16,7 +16,6 @@ import pytest
 from cosim.core import resources
 from cosim.scenario import load
 from plant_src.catalogue import MODELS, model_from_data
-from plant_src.vehicle_files.plausibility import vehicle_warnings
 
 DATA = {
     name: json.loads((resources.root() / f"plant_src/vehicles/data/{name}.json").read_text())
@@ -28,13 +27,13 @@ def warnings_of(name: str, change: Callable[[dict[str, Any]], Any]) -> list[str]
     change(data := copy.deepcopy(DATA[name]))
     return [
         f"{'.'.join(each.subject[1:])}: {each.message}"
-        for each in vehicle_warnings(model_from_data(data, name))
+        for each in model_from_data(data, name).warnings()
     ]
 
 
 def test_shipped_vehicles_have_no_warning() -> None:
     assert {
-        model.name: found for model in MODELS.values() if (found := list(vehicle_warnings(model)))
+        model.name: found for model in MODELS.values() if (found := list(model.warnings()))
     } == {}
 
 

@@ -14,12 +14,11 @@ from cosim.core.errors import Problem
 from cosim.core.units import KNOWN_UNITS
 
 from ..json_reader import argument_problem as warning
-from ..vehicles.common.vehicle_reader import RADIANS_EXPECTED
-from ..vehicles.model import Model
-from ..vehicles.planar_vessel.planar_vessel import PlanarVessel
-from ..vehicles.submerged.craft import Craft
-from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel
-from ..vehicles.vessel.boat import Boat
+from .common.vehicle_reader import RADIANS_EXPECTED
+from .planar_vessel.planar_vessel import PlanarVessel
+from .submerged.craft import Craft
+from .surface_vessel.surface_vessel import SurfaceVessel
+from .vessel.boat import Boat
 
 #: largest ratio of the thrust of all propellers to the weight: shipped vessels have at most 0.42,
 #: planing boats about 0.5, the shipped ROV 1.8
@@ -39,28 +38,31 @@ MAX_LENGTH_RATIO = 3.0
 _GRAVITY = 9.81
 
 
-def vessel_warnings(model: Model, corners: np.ndarray, max_length: float) -> Iterator[Problem]:
+def vessel_warnings(
+    vehicle: Boat | Craft, corners: np.ndarray, visual: np.ndarray | None, max_length: float
+) -> Iterator[Problem]:
     """Yield warnings about a vessel or a submerged vehicle.
 
     Args:
-        model: Model of the vehicle.
+        vehicle: Its data.
         corners: Corners of its boxes (m), from O of a vessel, shape (n, 3).
+        visual: Triangles that pictures show (m), shape (n, 3, 3).
         max_length: Largest plausible length of a hull (m).
     """
-    if model.boat:
-        yield from _boat_warnings(model.boat, corners)
-    if isinstance(model.boat, SurfaceVessel):
-        yield from _hull_warnings(model.boat, max_length)
-        if (draught := -model.boat.hull.bottom) > 0:
-            displaced = model.boat.water_density * model.boat.hull.area * draught
+    if isinstance(vehicle, Craft):
+        yield from _craft_warnings(vehicle, float(np.linalg.norm(corners, axis=1).max()))
+        displaced = vehicle.water_density * vehicle.displaced_volume
+        source = f"displaced_volume of {vehicle.displaced_volume:.4g} m3"
+        yield from _mass_warnings(vehicle.mass, displaced, source)
+        return
+    yield from _boat_warnings(vehicle, corners)
+    if isinstance(vehicle, SurfaceVessel):
+        yield from _hull_warnings(vehicle, max_length)
+        if (draught := -vehicle.hull.bottom) > 0:
+            displaced = vehicle.water_density * vehicle.hull.area * draught
             source = f"draught of {draught:.4g} m (hull.bottom with a minus sign)"
-            yield from _mass_warnings(model.boat.mass, displaced, source)
-        yield from _shape_warnings(model, corners, model.boat.hull.length)
-    if model.craft:
-        yield from _craft_warnings(model.craft, float(np.linalg.norm(corners, axis=1).max()))
-        displaced = model.craft.water_density * model.craft.displaced_volume
-        source = f"displaced_volume of {model.craft.displaced_volume:.4g} m3"
-        yield from _mass_warnings(model.craft.mass, displaced, source)
+            yield from _mass_warnings(vehicle.mass, displaced, source)
+        yield from _shape_warnings(corners, visual, vehicle.hull.length)
 
 
 def _boat_warnings(boat: Boat, corners: np.ndarray) -> Iterator[Problem]:
@@ -217,11 +219,13 @@ def _hull_warnings(vessel: SurfaceVessel, max_length: float) -> Iterator[Problem
             yield warning(text, "propellers", str(i), "position")
 
 
-def _shape_warnings(model: Model, corners: np.ndarray, length: float) -> Iterator[Problem]:
+def _shape_warnings(
+    corners: np.ndarray, visual: np.ndarray | None, length: float
+) -> Iterator[Problem]:
     """Yield a warning for each shape that is not that of the hull, whose length (m) is given."""
     shapes = {"boxes": corners}
-    if model.visual is not None:
-        shapes["visual"] = model.visual.reshape(-1, 3)
+    if visual is not None:
+        shapes["visual"] = visual.reshape(-1, 3)
     for key, points in shapes.items():
         extent = float(np.ptp(points[:, 0]))
         if max(extent, length) > MAX_LENGTH_RATIO * min(extent, length):
