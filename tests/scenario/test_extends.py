@@ -12,6 +12,7 @@ from systems import connection
 import cosim
 from cosim.scenario.extension import read_system_document
 from cosim.scenario.extension_schema import editor_schema
+from cosim.scenario.nested_systems import load_scenario
 from cosim.studies.regression import has_keys
 
 CHECK = {"kpi": "end.value", "max": 9.0}
@@ -334,6 +335,17 @@ def test_the_expanded_json_runs_anywhere(extend, tmp_path):
     result = cosim.run(copy)
     assert result.kpis["end.value"] == 30.0
     assert all(check.passed for check in result.checks)
+
+
+def test_the_expanded_json_has_all_keys_of_both_files(extend):
+    file = extend(stop_time=2, start_time=1, events=[{"time": 1, "set": {"a.k": 4.0}}])
+    printed = load_scenario(file, {"b.k": 5.0}).expanded()
+    value = expanded(file)
+    assert list(printed) == list(value)
+    components = printed.pop("components")
+    assert components["b"].pop("parameters") == {"k": 5.0}
+    assert components["a"]["parameters"] == {"u": 1.0}
+    assert printed == {key: each for key, each in value.items() if key != "components"}
 
 
 def test_the_editor_schema_accepts_extending_files(extend):

@@ -37,6 +37,25 @@ end M;""")
         assert list(model.get("v")) == [1 * a[0, j] + 2 * a[1, j] + 2 * x[j] for j in range(3)]
 
 
+def test_the_size_of_an_array_is_a_constant(compile_both):
+    model = compile_both("""model M
+  parameter Real A[2, 3] = {{1, 2, 3}, {4, 5, 6}};
+  parameter Integer rows = size(A, 1);
+  parameter Integer columns = size(A, 2);
+  input Real u;
+  output Real x[rows];
+  output Real y[columns];
+equation
+  when sample(0, 0.01) then
+    x = fill(u, rows);
+    y = u*ones(columns);
+  end when;
+end M;""")
+    for _, inputs in model.simulate(10):
+        assert list(model.get("x")) == [inputs["u"]] * 2
+        assert list(model.get("y")) == [inputs["u"]] * 3
+
+
 def test_matrix_products_transpose_and_slices(compile_both):
     model = compile_both("""model M
   input Real A[2, 3];
