@@ -1,7 +1,9 @@
 """Margins as KPIs and diagrams in the report of a scenario, and the commands."""
 
 import json
+import math
 
+import linear_blocks
 import numpy as np
 import pytest
 from cosim_command import run_cosim
@@ -54,6 +56,25 @@ def test_a_check_of_the_phase_margin_and_a_diagram_in_the_report(tmp_path):
     assert json.loads((tmp_path / "runs/flight/run.json").read_text())["parameters"] == {
         "uav.altitude_command": 2.5
     }
+
+
+@pytest.mark.parametrize(("gain", "stable"), [(0.5, True), (-0.1, False)])
+def test_an_unstable_loop_has_no_margins(gain, stable):
+    """The loop is an integrator; a negative gain lets it grow."""
+    scenario = linear_blocks.loop(gain, linear_blocks.block([[1]], [[1]], [[1]]))
+    for component in scenario["components"].values():
+        component["python"] = f"{linear_blocks.__file__}:StateSpace"
+    arguments = {"components": "controller", "at": 0.5, "loops": ["plant.y0"]}
+    evaluation = {"python": "cosim.analysis.kpis:margins", "arguments": arguments}
+    result = cosim.run({**scenario, "kpis": [{"name": "loop", **evaluation}]})
+    assert result.kpis["loop.stable"] is stable
+    margins = [result.kpis[f"loop.{name}_margin"] for name in ("gain", "phase", "delay", "disk")]
+    if stable:
+        assert all(0 < margin < math.inf for margin in margins)
+    else:
+        assert np.isnan(margins).all()
+        (note,) = result.metadata["kpi_notes"]
+        assert "a loop of controller is unstable, or its linear model is not valid" in note
 
 
 def test_the_figures_of_a_result_show_its_loops_and_poles():

@@ -8,7 +8,6 @@ from fakes import FakeComponent, gain, inputs, outputs
 from systems import make_system, run_system
 
 from cosim.core.errors import ComponentError
-from cosim.core.graph import ordered_groups
 from cosim.core.units import parse_unit
 from cosim.engine.initialization import find_loops
 
@@ -122,9 +121,3 @@ def test_declared_dependencies_decide_what_is_a_loop():
     assert sorted(map(str, loop)) == ["controller.u", "controller.y", "plant.u", "plant.y"]
     plant.initial_dependencies = {"y": frozenset()}
     assert find_loops(system) == []
-
-
-def test_groups_are_ordered_by_their_dependencies_and_else_as_listed():
-    predecessors = {"d": "c", "c": "bd", "a": "", "b": "a", "e": ""}
-    assert ordered_groups(predecessors) == [["a"], ["b"], ["d", "c"], ["e"]]
-    assert ordered_groups({"b": "", "a": ""}) == [["b"], ["a"]]

@@ -112,9 +112,14 @@ def test_the_end_is_that_of_the_definition(kind: Any, every: int) -> None:
 
 
 @pytest.mark.parametrize("kind", EXECUTORS)
-def test_a_condition_can_end_the_run_at_its_start(kind: Any) -> None:
-    outcome = run(series([1.0] * 60), stop("a.y == 1"), kind=kind)
-    assert (outcome.macro_steps, outcome.recording.time.tolist()) == (0, [0.0])
+@pytest.mark.parametrize(("hold", "times"), [(0, [0.0]), ("0.2", [0.0, 0.1, 0.2])])
+def test_a_condition_can_be_met_at_the_start_of_the_run(
+    kind: Any, hold: float | str, times: list[float]
+) -> None:
+    outcome = run(series([1.0] * 60), stop("a.y == 1", hold), kind=kind)
+    assert outcome.termination is not None
+    assert outcome.termination.condition == ("end", "decided", "a.y == 1", 0.0, times[-1])
+    assert outcome.recording.time.tolist() == times
 
 
 @pytest.mark.parametrize("kind", EXECUTORS)

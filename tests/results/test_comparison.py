@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cosim.core.errors import InputError
 from cosim.core.recording import Recording
 from cosim.results import Result
 from cosim.results.comparison import compare, needed_share
@@ -59,6 +60,28 @@ def test_message_names_first_signal_time_and_distance():
         "2 of 2 signals failed",
         f"a.y leaves its tube at {first}",
         f"a.x leaves its tube at {second}",
+    ]
+
+
+@pytest.mark.parametrize("value", [-0.1, np.nan, np.inf])
+@pytest.mark.parametrize("name", Tolerance._fields)
+def test_an_invalid_tolerance_is_refused(name, value):
+    """Infinity and NaN would accept every signal."""
+    tolerances = {"*": Tolerance(), "a.*": Tolerance(**{name: value})}
+    message = f'tolerance of "a.*": "{name}" is {value}, expected a finite number of at least 0'
+    with pytest.raises(InputError) as raised:
+        compare(REFERENCE, REFERENCE, tolerances)
+    assert str(raised.value) == message
+
+
+def test_all_invalid_tolerances_are_named():
+    tolerances = {"a.x": Tolerance(absolute=-1, time=np.nan), "b.*": Tolerance(relative=-2)}
+    with pytest.raises(InputError) as raised:
+        compare(REFERENCE, REFERENCE, tolerances)
+    assert [problem.message.split(",")[0] for problem in raised.value.problems] == [
+        'tolerance of "a.x": "absolute" is -1',
+        'tolerance of "a.x": "time" is nan',
+        'tolerance of "b.*": "relative" is -2',
     ]
 
 

@@ -1,4 +1,4 @@
-"""The force models of the published simulator, as FMUs of both versions, against its formulas
+"""The force models of the published simulator, built as FMUs of both versions, against its formulas
 written out with its numbers.
 """
 
@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import pytest
 from fakes import FakeComponent, outputs
@@ -16,16 +17,27 @@ from cosim.core.system import Connection, Endpoint, System
 from cosim.core.time_grid import exact_fraction
 from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
+from cosim.export.build import build_to
 
 Loads = Callable[..., dict[str, float]]
 
 
-@pytest.fixture(params=["fmus", "fmus/fmi3"])
-def loads(request: pytest.FixtureRequest) -> Loads:
+@pytest.fixture(scope="module", params=[2, 3])
+def fmus(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of the FMUs, which are built from their sources: `fmus/` may be older."""
+    folder = tmp_path_factory.mktemp("fmus")
+    for name in ("air_drag", "hull_hydrodynamics", "rotor_map", "rudder"):
+        source = resources.root() / f"plant_src/replica/forces/{name}.py"
+        build_to(source, None, folder / f"{name}.fmu", request.param)
+    return folder
+
+
+@pytest.fixture
+def loads(fmus: Path) -> Loads:
     """Function that evaluates an FMU (by name) with inputs and parameters."""
 
     def evaluated(name: str, inputs: Mapping[str, float], **parameters: float) -> dict[str, float]:
-        file = FmuFile(resources.root() / request.param / f"{name}.fmu")
+        file = FmuFile(fmus / f"{name}.fmu")
         source = FakeComponent(outputs(*inputs), lambda *_: None, start=inputs)
         connected = [Connection(Endpoint("in", slot), Endpoint("fmu", slot)) for slot in inputs]
         components = {"in": source, "fmu": create_component(file, "fmu")}
