@@ -58,11 +58,12 @@ def missing_lines(shown, output):
     may differ.
     """
     printed = [line.split() for line in output.splitlines()]
-    return [
-        line
-        for line in shown.splitlines()
-        if "─" not in line and not any(alike(line.split(), words) for words in printed)
-    ]
+    missing = []
+    for line in shown.splitlines():
+        words = line.split()
+        if "─" not in line and not any(alike(words, others) for others in printed):
+            missing.append(line)
+    return missing
 
 
 def alike(words, others):

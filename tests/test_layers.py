@@ -115,9 +115,7 @@ def imported(name):
 @cache
 def import_graph():
     """Return the modules that each module imports."""
-    return {
-        name: {other for other in imported(name) if other in MODULES} - {name} for name in MODULES
-    }
+    return {name: set(imported(name)) & MODULES.keys() - {name} for name in MODULES}
 
 
 def layer(name):

@@ -4,7 +4,7 @@ Mass, inertia, dimensions, actuators, top speed and turning of a vessel, paramet
 mistakes.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -139,7 +139,7 @@ def describe_vehicle(
     return properties | (dict(boat_properties(model.boat)) if model.boat else {}), model.variables
 
 
-def _edges(lengths: Sequence[float]) -> str:
+def _edges(lengths: Iterable[float]) -> str:
     return f"{' x '.join(f'{length:.4g}' for length in lengths)} m"
 
 

@@ -118,10 +118,8 @@ def test_touchdown_is_marked_in_both_panels():
     above, below = landing(mission_result(), **LANDING).axes
     time, altitude = drawn(above)["touchdown"]
     assert (time[0], altitude[0]) == pytest.approx((TOUCHDOWN, 0.325))
-    assert all(
-        [TOUCHDOWN, TOUCHDOWN] in [list(line.get_xdata()) for line in axes.lines]
-        for axes in (above, below)
-    )
+    for axes in (above, below):
+        assert [TOUCHDOWN, TOUCHDOWN] in [list(line.get_xdata()) for line in axes.lines]
 
 
 def test_phases_are_shaded_and_named_once_each():
@@ -159,13 +157,10 @@ def test_a_window_can_be_chosen():
 
 
 def test_a_vehicle_has_one_colour_in_all_figures():
-    colours = [
-        {
-            line.get_label(): line.get_color()
-            for line in figure(mission_result(), **DECK).axes[0].lines
-        }
-        for figure in (paths, landing)
-    ]
+    colours = []
+    for figure in (paths, landing):
+        lines = figure(mission_result(), **DECK).axes[0].lines
+        colours.append({line.get_label(): line.get_color() for line in lines})
     assert (
         colours[0]["quadcopter"]
         == colours[1]["quadcopter"]

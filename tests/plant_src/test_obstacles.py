@@ -5,6 +5,7 @@ refusals.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -19,16 +20,23 @@ from plant_src.placement import obstacles_of
 from plant_src.scene.replay import world_scene
 
 HARBOUR = json.loads((resources.root() / "scenarios/meshes/harbour.json").read_text())
-#: quads of a box as corners of its vertices, and both triangles of a quad
+#: quads of a box as corners of its vertices
 QUADS = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
-FACES = [[quad[i] for i in half] for quad in QUADS for half in ((0, 1, 2), (0, 2, 3))]
+
+
+def triangles(quads: Iterable[tuple[int, ...]]) -> list[list[int]]:
+    """Return both triangles of each quad."""
+    faces = []
+    for a, b, c, d in quads:
+        faces += [[a, b, c], [a, c, d]]
+    return faces
 
 
 def box(low: tuple[float, ...], high: tuple[float, ...]) -> dict[str, Any]:
     (a, b, c), (d, e, f) = low, high
     return {
         "vertices": [[x, y, z] for z in (c, f) for x, y in ((a, b), (d, b), (d, e), (a, e))],
-        "faces": FACES,
+        "faces": triangles(QUADS),
     }
 
 
@@ -46,7 +54,7 @@ def arch() -> dict[str, Any]:
     quads += [(k + a, k + b, k + 8 + b, k + 8 + a) for k in (0, 4) for a, b in sides]
     return {
         "vertices": vertices,
-        "faces": [[q[i] for i in half] for q in quads for half in ((0, 1, 2), (0, 2, 3))],
+        "faces": triangles(quads),
     }
 
 

@@ -68,10 +68,8 @@ class Importer:
 
     def values(self) -> list[Any]:
         reals = self.slave.getReal([self.references[name] for name in self.names])
-        return reals + [
-            bool(value)
-            for value in self.slave.getBoolean([self.references[name] for name in self.flags])
-        ]
+        flags = self.slave.getBoolean([self.references[name] for name in self.flags])
+        return reals + [bool(value) for value in flags]
 
 
 @pytest.fixture
@@ -114,10 +112,8 @@ def test_the_fmu_computes_what_the_world_does(
         "1",
         "world in process",
     )
-    height, touching = (
-        np.array([row[names.index(name)] for row in expected])
-        for name in ("uav.position.z", "uav.contact.force")
-    )
+    height = np.array([row[names.index("uav.position.z")] for row in expected])
+    touching = np.array([row[names.index("uav.contact.force")] for row in expected])
     assert height.max() > 1.0
     assert touching[-1] > 0
     assert (touching == 0).sum() > 100

@@ -42,12 +42,11 @@ def landing() -> WorldHarness:
 
 def rows(trial: WorldHarness, steps: int) -> np.ndarray:
     """Return the outputs after each step."""
-    return np.array(
-        [
-            np.concatenate([a.astype(float) for a in trial.step().outputs.arrays.values()])
-            for _ in range(steps)
-        ]
-    )
+    found = []
+    for _ in range(steps):
+        arrays = trial.step().outputs.arrays.values()
+        found.append(np.concatenate([array.astype(float) for array in arrays]))
+    return np.array(found)
 
 
 @pytest.fixture

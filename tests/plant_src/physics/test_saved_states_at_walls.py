@@ -27,7 +27,9 @@ def wall(
 ) -> dict[str, Any]:
     (a, b, c), (d, e, f) = low, high
     vertices = [[x, y, z] for z in (c, f) for x, y in ((a, b), (d, b), (d, e), (a, e))]
-    faces = [[quad[i] for i in half] for quad in QUADS for half in ((0, 1, 2), (0, 2, 3))]
+    faces = []
+    for p, q, r, s in QUADS:
+        faces += [[p, q, r], [p, r, s]]
     return {"mesh": {"vertices": vertices, "faces": faces}, **more}
 
 

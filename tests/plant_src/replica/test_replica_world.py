@@ -49,10 +49,10 @@ class Trial:
         self.world = World("plant", {"uav": uav, "usv": usv or {"position": [30.0, 0.0]}}, **more)
         self.inputs, self.outputs = np.zeros(14), np.zeros(22)
         variables = self.world.variables
-        ports = [
-            Ports([v for v in variables if v.causality == causality], {np.dtype(float): array})
-            for causality, array in (("input", self.inputs), ("output", self.outputs))
-        ]
+        ports = []
+        for causality, array in (("input", self.inputs), ("output", self.outputs)):
+            chosen = [variable for variable in variables if variable.causality == causality]
+            ports.append(Ports(chosen, {np.dtype(float): array}))
         self.world.bind(*ports)
 
     def step(self, count: int = 1, **loads: float) -> Trial:

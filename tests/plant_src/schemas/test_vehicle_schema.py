@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+from collections.abc import Iterable
 from typing import Any
 
 import jsonschema
@@ -16,18 +17,17 @@ from plant_src.schemas.vehicle import vehicle_schema
 
 FILES = sorted((resources.root() / "plant_src/vehicles/data").glob("*.json"))
 VALIDATOR = jsonschema.Draft202012Validator(vehicle_schema())
-EXAMPLES = {data["family"]: data for data in (json.loads(file.read_text()) for file in FILES)}
+DATA = [json.loads(file.read_text()) for file in FILES]
+EXAMPLES = {data["family"]: data for data in DATA}
 
 
 def paths(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     """Paths of all keys of objects."""
-    items = (
-        data.items()
-        if isinstance(data, dict)
-        else enumerate(data)
-        if isinstance(data, list)
-        else ()
-    )
+    items: Iterable[tuple[Any, Any]] = ()
+    if isinstance(data, dict):
+        items = data.items()
+    elif isinstance(data, list):
+        items = enumerate(data)
     below = [(*path, key) for key, _ in items] if isinstance(data, dict) else []
     return below + [found for key, value in items for found in paths(value, (*path, key))]
 
