@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .analysis.loop_margins import margins
     from .analysis.trimming import trim
     from .api import Result, Simulation, load, run
-    from .api.comparison import compare
+    from .api.reference_comparison import compare
     from .api.single_fmu import simulate
     from .core.component import Component, Variable
     from .core.errors import CheckError, ComponentError, CosimError, InputError

@@ -150,7 +150,7 @@ class Regression:
         return replace(outcome, summary=summary, details=(*outdated, *outcome.details))
 
     def _compare(self, run: _FinishedRun) -> RegressionOutcome:
-        from ..api.comparison import reference_changes
+        from ..api.reference_comparison import reference_changes
         from ..results.comparison import compare, needed_share
 
         failed = run.failed_checks()

@@ -18,7 +18,7 @@ from ..environment.settings import (
     TURBULENCE_HEIGHT,
 )
 from ..environment.wind_and_current import MAX_HEIGHT, MIN_HEIGHT
-from .parts import (
+from .schema_parts import (
     AT_LEAST_0,
     NUMBER,
     POSITIVE,

@@ -6,7 +6,7 @@ from ..vehicles.planar_vessel import planar_vessel as planar
 from ..vehicles.submerged import craft as submerged
 from ..vehicles.surface_vessel import surface_vessel as surface
 from ..vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
-from .parts import (
+from .schema_parts import (
     TEXT,
     Schema,
     family_schema,

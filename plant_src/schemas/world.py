@@ -7,7 +7,7 @@ Defaults, limits and lists of names are those of the readers.
 
 from ..placement import CONCRETE, DRY
 from .environment import ENVIRONMENT_SCHEMAS
-from .parts import (
+from .schema_parts import (
     AT_LEAST_0,
     NUMBER,
     POSITIVE,

@@ -100,7 +100,7 @@ def report(result: Path, output_file: Path | None, reference: Path | None, open_
 
     RESULT is a folder written by `cosim run`. The page is a single file and needs no network.
     """
-    from ...api.comparison import ComparisonTask, is_scenario
+    from ...api.reference_comparison import ComparisonTask, is_scenario
     from ...report.run_page import Deviation, write_folder_report
     from ...results.tolerance_tube import Tolerance
     from ...studies.regression import accept_command

@@ -66,7 +66,7 @@ def compare(
     leaves its tube, is missing, ends early, or is not finite. The text lists the 10 earliest
     failures.
     """
-    from ...api.comparison import ComparisonTask
+    from ...api.reference_comparison import ComparisonTask
     from ...results.tolerance_tube import Tolerance
 
     if plot and plot.suffix not in (".png", ".svg"):

@@ -29,7 +29,7 @@ from .description import FmuDescription
 from .file import FmuFile
 from .library import MissingFunctionError, as_pointer, load_library, unregister_logger
 from .preflight.binary import version_deviations
-from .preflight.functions import ACCESSORS, function_prefix
+from .preflight.c_functions import ACCESSORS, function_prefix
 from .preflight.model_description import Interface
 from .preflight.platforms import EXPECTED_TEXTS
 from .settings import InstanceSettings

@@ -20,7 +20,7 @@ from typing import Any, get_args
 from ...core.errors import InputError
 from .description import FmuDescription
 from .file import FmuFile
-from .preflight.functions import function_prefix
+from .preflight.c_functions import function_prefix
 from .preflight.platforms import current_platform
 
 try:

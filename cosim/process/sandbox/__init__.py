@@ -35,7 +35,7 @@ from ...core.errors import InputError
 from .. import limits
 from . import landlock, system_call_filter
 from .bubblewrap import bubblewrap_command, find_bubblewrap
-from .environment import KEPT_VARIABLES, clear_environment, interpreter_folders
+from .child_environment import KEPT_VARIABLES, clear_environment, interpreter_folders
 
 __all__ = [
     "KEPT_VARIABLES",

@@ -36,7 +36,7 @@ from ..api import DISCARD, OK
 from ..driver import FmuComponent, FmuDriver
 from ..file import FmuFile
 from ..settings import InstanceSettings, Isolation
-from .messages import (
+from .pipe_messages import (
     INVALID_ANSWER_ERRORS,
     STEP_COMMAND,
     STEP_DONE,

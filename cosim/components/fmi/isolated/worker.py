@@ -27,7 +27,7 @@ from ....process.journal import (
     watch_forks,
 )
 from ..driver import FmuDriver
-from .messages import (
+from .pipe_messages import (
     STEP_COMMAND,
     STEP_DONE,
     SpinningPoller,

@@ -24,7 +24,7 @@ from ....process.journal import (
 from ....process.limits import skip_exit_handlers
 from ....process.standard_streams import ForeignOutput
 from ....process.supervisor import POLL_INTERVAL
-from .messages import (
+from .pipe_messages import (
     INVALID_ANSWER_ERRORS,
     READ_SIZE,
     STEP_DONE,

@@ -9,8 +9,8 @@ from pathlib import Path
 from ....core.errors import abbreviate_names
 from . import elf, macho, pe
 from .archive import Archive
+from .c_functions import called_functions, standard_functions
 from .findings import Finding, escape_unprintable
-from .functions import called_functions, standard_functions
 from .model_description import Interface, ModelDescription
 from .platforms import EXPECTED_TEXTS, FmuPlatform, InvalidLibraryError, SharedLibrary
 

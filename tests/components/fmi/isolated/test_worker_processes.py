@@ -19,7 +19,7 @@ import pytest
 from systems import endpoint, make_system, run_system
 
 from cosim.components.fmi import FmuFile, Isolation, create_component
-from cosim.components.fmi.isolated.messages import (
+from cosim.components.fmi.isolated.pipe_messages import (
     SPIN_COUNT,
     STEP_COMMAND,
     STEP_DONE,

@@ -13,7 +13,7 @@ from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 from cosim.components.fmi import FmuFile
 from cosim.components.fmi.preflight import elf
-from cosim.components.fmi.preflight.functions import standard_functions
+from cosim.components.fmi.preflight.c_functions import standard_functions
 from cosim.components.fmi.preflight.platforms import FmuPlatform, current_platform
 from cosim.core import resources
 from cosim.export.fmu.compiler import find_compiler

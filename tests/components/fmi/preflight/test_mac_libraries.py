@@ -11,7 +11,7 @@ from bad_fmus import members, pack_archive
 from cosim.components.fmi.preflight import examine, macho
 from cosim.components.fmi.preflight.archive import Archive, open_regular_file
 from cosim.components.fmi.preflight.binary import check_binary
-from cosim.components.fmi.preflight.functions import standard_functions
+from cosim.components.fmi.preflight.c_functions import standard_functions
 from cosim.components.fmi.preflight.platforms import FmuPlatform, InvalidLibraryError, SharedLibrary
 
 FMPY = Path(fmpy.__file__).parent

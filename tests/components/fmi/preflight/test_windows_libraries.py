@@ -9,7 +9,7 @@ from bad_fmus import read_members
 from cosim.components.fmi.preflight import examine, pe
 from cosim.components.fmi.preflight.archive import Archive, open_regular_file
 from cosim.components.fmi.preflight.binary import check_binary
-from cosim.components.fmi.preflight.functions import standard_functions
+from cosim.components.fmi.preflight.c_functions import standard_functions
 from cosim.components.fmi.preflight.platforms import FmuPlatform, InvalidLibraryError
 from cosim.core import resources
 
