@@ -58,7 +58,7 @@ _MODULES = {
     **dict.fromkeys(("CheckError", "ComponentError", "CosimError", "InputError"), "core.errors"),
     **dict.fromkeys(("NoValue", "Prefix", "Signal", "better", "no_value", "units"), "results.kpi"),
     **dict.fromkeys(("regress", "sweep", "tune", "worst_case"), "studies.functions"),
-    "compare": "api.comparison",
+    "compare": "api.reference_comparison",
     "linearize": "analysis.linearization",
     "margins": "analysis.loop_margins",
     "simulate": "api.single_fmu",
