@@ -15,6 +15,7 @@ from itertools import islice
 from typing import NamedTuple
 
 import casadi as ca
+from casadi import SX
 
 _OPERATIONS = {
     ca.OP_ASSIGN: "{}",
@@ -66,14 +67,14 @@ class Callee:
     #: C text in front of the definition
     attributes: str = ""
 
-    def __call__(self, *arguments: ca.SX) -> ca.SX:
+    def __call__(self, *arguments: SX) -> SX:
         """Return the result as an expression that stays a function call in the C code."""
         return call_in_c(self.function, *arguments)[0]
 
 
-def call_in_c(function: ca.Function, *arguments: ca.SX) -> list[ca.SX]:
+def call_in_c(function: ca.Function, *arguments: SX) -> list[SX]:
     """Return the results of a function, which is called and not inlined in the C code."""
-    results: list[ca.SX] = function.call(list(arguments), False, True)
+    results: list[SX] = function.call(list(arguments), False, True)
     return results
 
 
@@ -153,7 +154,7 @@ def function_body(function: ca.Function) -> str:
 
 def densify(function: ca.Function) -> ca.Function:
     """Return the function with dense results and without common subexpressions."""
-    arguments = [ca.SX.sym(f"a{i}", function.size_in(i)) for i in range(function.n_in())]
+    arguments = [SX.sym(f"a{i}", function.size_in(i)) for i in range(function.n_in())]
     results = ca.cse([ca.densify(result) for result in function.call(arguments)])
     return ca.Function(function.name(), arguments, results)
 
@@ -278,8 +279,8 @@ def sum_over_rows(name: str, term: ca.Function, rows: int) -> Callee:
         The function (common, count, *tables) -> sum of the terms, where a table has the shape
         (rows, columns) and only the first `count` rows are used.
     """
-    common, count = ca.SX.sym("common", term.size1_in(0)), ca.SX.sym("count")
-    tables = [ca.SX.sym("table", rows, term.size1_in(i)) for i in range(1, term.n_in())]
+    common, count = SX.sym("common", term.size1_in(0)), SX.sym("count")
+    tables = [SX.sym("table", rows, term.size1_in(i)) for i in range(1, term.n_in())]
     terms = []
     for k in range(rows):
         row = [table[k, :].T for table in tables]

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 import casadi as ca
+from casadi import SX
 
 from ...core.component import Variable
 from ..fmu.block import Block, BlockVariable
@@ -97,12 +98,12 @@ def _casadi_functions(model: ContinuousModel) -> list[ca.Function]:
     `observe` and, with states, `initial_state` and `sub_step`.
     """
     parameters, constants = (
-        ca.SX.sym("parameters", len(model.elements("parameter"))),
+        SX.sym("parameters", len(model.elements("parameter"))),
         model.derived_parameter_symbols(),
     )
-    inputs = ca.SX.sym("inputs", len(model.elements("input")))
-    state = ca.SX.sym("state", len(model.states))
-    step = ca.SX.sym("step")
+    inputs = SX.sym("inputs", len(model.elements("input")))
+    state = SX.sym("state", len(model.states))
+    step = SX.sym("step")
     outputs = ca.vertsplit(model.outputs(state, inputs, constants))
     flags = model.boolean_outputs()
     real_outputs = ca.vertcat(*(y for y, flag in zip(outputs, flags, strict=True) if not flag))

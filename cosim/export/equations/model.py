@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Self
 
 import casadi as ca
+from casadi import SX
 
 from ...core.component import Variable
 from .c_code import Callee, call_in_c
@@ -40,13 +41,13 @@ class ContinuousModel:
     #: names of the elements of the state, for error messages
     states: Sequence[str]
     #: parameters -> initial state
-    initial_state: Callable[[ca.SX], ca.SX]
+    initial_state: Callable[[SX], SX]
     #: state, inputs, parameters -> time derivative of the state
-    derivatives: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
+    derivatives: Callable[[SX, SX, SX], SX]
     #: state, inputs, parameters -> outputs; Boolean outputs as 0 or 1
-    outputs: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
+    outputs: Callable[[SX, SX, SX], SX]
     #: state -> state, applied after each sub-step, for example to normalize a quaternion
-    project: Callable[[ca.SX], ca.SX] = lambda state: state
+    project: Callable[[SX], SX] = lambda state: state
     #: preferred communication step size (s)
     step_size: float = 0.01
     #: longest integration step (s)
@@ -55,7 +56,7 @@ class ContinuousModel:
     resources: Mapping[str, Path] = field(default_factory=dict)
     #: parameters -> derived parameters, computed once at initialization; the other callables get
     #: these instead of `parameters`
-    derived_parameters: Callable[[ca.SX], ca.SX] | None = None
+    derived_parameters: Callable[[SX], SX] | None = None
     #: functions with a hand-written C body that the expressions call
     callees: Sequence[Callee] = ()
 
@@ -65,28 +66,26 @@ class ContinuousModel:
         All stages of the integration call it, so that the code is small.
         """
         symbols = [
-            ca.SX.sym("state", len(self.states)),
-            ca.SX.sym("inputs", len(self.elements("input"))),
+            SX.sym("state", len(self.states)),
+            SX.sym("inputs", len(self.elements("input"))),
             self.derived_parameter_symbols(),
         ]
         rate = ca.Function("rate_of_change", symbols, [self.derivatives(*symbols)])
         return replace(self, derivatives=lambda *arguments: call_in_c(rate, *arguments)[0])
 
-    def derived_parameter_symbols(self) -> ca.SX:
+    def derived_parameter_symbols(self) -> SX:
         """Return symbols of the derived parameters.
 
         Without derived ones they are those of the parameters themselves.
         """
-        parameters = ca.SX.sym("parameters", len(self.elements("parameter")))
+        parameters = SX.sym("parameters", len(self.elements("parameter")))
         return (
-            ca.SX.sym("constants", self.derived_parameters(parameters).numel())
+            SX.sym("constants", self.derived_parameters(parameters).numel())
             if self.derived_parameters
             else parameters
         )
 
-    def integrate(
-        self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1
-    ) -> ca.SX:
+    def integrate(self, state: SX, inputs: SX, parameters: SX, step: SX, sub_steps: int = 1) -> SX:
         """Return the state after a step with constant inputs.
 
         Args:
@@ -121,7 +120,7 @@ def static_model(
     identifier: str,
     description: str,
     variables: Sequence[Variable],
-    outputs: Callable[[ca.SX, ca.SX], ca.SX],
+    outputs: Callable[[SX, SX], SX],
 ) -> ContinuousModel:
     """Create a model without states, y = g(u, p).
 
@@ -131,7 +130,7 @@ def static_model(
         variables: Its parameters, inputs and outputs.
         outputs: inputs, parameters -> outputs, as column vectors.
     """
-    no_state = ca.SX(0, 1)
+    no_state = SX(0, 1)
     return ContinuousModel(
         identifier,
         description,
@@ -143,7 +142,7 @@ def static_model(
     )
 
 
-def runge_kutta_4(rate: Callable[[ca.SX], ca.SX], state: ca.SX, step: ca.SX) -> ca.SX:
+def runge_kutta_4(rate: Callable[[SX], SX], state: SX, step: SX) -> SX:
     """Return the state after a step of the Runge-Kutta method of order 4 for x' = rate(x)."""
     k1 = rate(state)
     k2 = rate(state + step / 2 * k1)

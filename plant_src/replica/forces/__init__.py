@@ -7,6 +7,7 @@ tunable parameters. They are stepped before the plant, with the delayed signals 
 from collections.abc import Callable, Sequence
 
 import casadi as ca
+from casadi import SX
 
 from cosim.core.component import Variable
 from cosim.core.units import parse_unit
@@ -24,7 +25,7 @@ VESSEL_INPUTS = (
 )
 
 
-def planar_velocity(motion: ca.SX) -> ca.SX:
+def planar_velocity(motion: SX) -> SX:
     """Return surge u, sway v (m/s) and yaw rate r (rad/s) from `VESSEL_INPUTS`."""
     x, y, rate, yaw = ca.vertsplit(motion)
     return ca.vertcat(ca.cos(yaw) * x + ca.sin(yaw) * y, ca.cos(yaw) * y - ca.sin(yaw) * x, rate)
@@ -49,7 +50,7 @@ def force_model(
     identifier: str,
     description: str,
     variables: Sequence[Variable],
-    loads: Callable[[ca.SX, ca.SX], ca.SX],
+    loads: Callable[[SX, SX], SX],
 ) -> Block:
     """Return the block of a force model.
 

@@ -6,6 +6,7 @@ The plant has one input for both (equation 10 of the paper).
 from __future__ import annotations
 
 import casadi as ca
+from casadi import SX
 
 from cosim.export.fmu.block import Block
 
@@ -32,7 +33,7 @@ VARIABLES = (
 )
 
 
-def loads(inputs: ca.SX, coefficient: ca.SX) -> ca.SX:
+def loads(inputs: SX, coefficient: SX) -> SX:
     """Return X, Y (N) and N (N m)."""
     u, v, _ = ca.vertsplit(planar_velocity(inputs[0:4]))
     return inputs[4:7] - coefficient * ca.vertcat(u * ca.fabs(u), v * ca.fabs(v), 0)

@@ -6,6 +6,7 @@ Surge has no damping.
 from __future__ import annotations
 
 import casadi as ca
+from casadi import SX
 
 from cosim.export.fmu.block import Block
 
@@ -31,7 +32,7 @@ VARIABLES = (
 )
 
 
-def loads(motion: ca.SX, parameters: ca.SX) -> ca.SX:
+def loads(motion: SX, parameters: SX) -> SX:
     """Return X, Y (N) and N (N m)."""
     _, v, r = ca.vertsplit(planar_velocity(motion))
     hulls, y_v, y_r, n_v, n_r = ca.vertsplit(parameters)

@@ -6,6 +6,7 @@ The speed w follows the throttle without delay.
 from __future__ import annotations
 
 import casadi as ca
+from casadi import SX
 
 from cosim.core.component import Variable
 from cosim.core.units import parse_unit
@@ -49,7 +50,7 @@ VARIABLES = (
 )
 
 
-def loads(throttle: ca.SX, parameters: ca.SX) -> ca.SX:
+def loads(throttle: SX, parameters: SX) -> SX:
     """Return four thrusts (N), then four torques (N m)."""
     thrust_coefficient, torque_coefficient, max_speed = ca.vertsplit(parameters)
     speed = ca.fmin(100, ca.fmax(0, throttle)) / 100 * max_speed

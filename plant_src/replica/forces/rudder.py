@@ -12,6 +12,7 @@ import math
 import sys
 
 import casadi as ca
+from casadi import SX
 
 from cosim.export.fmu.block import Block
 
@@ -46,7 +47,7 @@ VARIABLES = (
 )
 
 
-def loads(inputs: ca.SX, parameters: ca.SX) -> ca.SX:
+def loads(inputs: SX, parameters: SX) -> SX:
     """Return X and Y (N)."""
     u, v, r = ca.vertsplit(planar_velocity(inputs[0:4]))
     rudder_angle = inputs[4]

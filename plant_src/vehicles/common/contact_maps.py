@@ -43,6 +43,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import casadi as ca
+from casadi import SX
 
 from cosim.export.equations.model import ContinuousModel
 
@@ -57,7 +58,7 @@ from .interface import (
 from .rigid_body import RigidBody, motion_of_state
 
 #: symbols by the names of the arguments of a function
-Symbols = dict[str, ca.SX]
+Symbols = dict[str, SX]
 
 #: longest step of the world (s)
 MAX_WORLD_STEP = 0.01
@@ -86,7 +87,7 @@ class FreeContactMaps:
     """
 
     model: ContinuousModel
-    rigid_body: Callable[[ca.SX], RigidBody]
+    rigid_body: Callable[[SX], RigidBody]
 
     def functions(self) -> list[ca.Function]:
         """Return the functions to export."""
@@ -147,7 +148,7 @@ class SubmergedContactMaps(FreeContactMaps):
             velocity and rates (6, body frame), with the added mass.
     """
 
-    velocity_change: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX]
+    velocity_change: Callable[[SX, SX, SX, SX], SX]
 
     def _predict_function(self) -> ca.Function:
         arguments = predict_symbols(self.model) | create_symbols(
@@ -168,7 +169,7 @@ class SubmergedContactMaps(FreeContactMaps):
             end,
             twist,
             ca.vertcat(state[0:3], end[0:3]),
-            ca.SX(0),
+            SX(0),
             compensating_torque=gyroscopic_torque(body.inertia_in_world(state[3:7]), twist[3:6]),
             bullet_pose=principal_pose(state, arguments["principal_axes"]),
             previous_contact_impulse=impulse,
@@ -198,7 +199,7 @@ class SubmergedContactMaps(FreeContactMaps):
 
 
 def named_function(
-    name: str, arguments: Mapping[str, ca.SX], results: Mapping[str, ca.SX]
+    name: str, arguments: Mapping[str, SX], results: Mapping[str, SX]
 ) -> ca.Function:
     """Return the function of symbols to expressions, whose names the binary exports."""
     return ca.Function(name, [*arguments.values()], [*results.values()], [*arguments], [*results])
@@ -206,14 +207,14 @@ def named_function(
 
 def create_symbols(**sizes: int) -> Symbols:
     """Return a column vector of symbols for each name and size."""
-    return {name: ca.SX.sym(name, size) for name, size in sizes.items()}
+    return {name: SX.sym(name, size) for name, size in sizes.items()}
 
 
 def initialize_function(
     model: ContinuousModel,
-    twist: Callable[[ca.SX, ca.SX], ca.SX],
-    pose: Callable[[ca.SX, ca.SX], ca.SX],
-    **further_arguments: ca.SX,
+    twist: Callable[[SX, SX], SX],
+    pose: Callable[[SX, SX], SX],
+    **further_arguments: SX,
 ) -> ca.Function:
     """Return `contact_initialize`.
 
@@ -242,10 +243,10 @@ def free_initialize_function(model: ContinuousModel) -> ca.Function:
     """Return `contact_initialize` of a body whose state begins with that of a free rigid body."""
     axes = create_symbols(principal_axes=4)
 
-    def twist(state: ca.SX, _constants: ca.SX) -> ca.SX:
+    def twist(state: SX, _constants: SX) -> SX:
         return ca.vertcat(state[7:10], kinematics.rotation_matrix(state[3:7]) @ state[10:13])
 
-    def pose(state: ca.SX, _constants: ca.SX) -> ca.SX:
+    def pose(state: SX, _constants: SX) -> SX:
         return principal_pose(state, axes["principal_axes"])
 
     return initialize_function(model, twist, pose, **axes)
@@ -280,9 +281,7 @@ def correct_symbols(model: ContinuousModel) -> Symbols:
     }
 
 
-def predicted_state(
-    model: ContinuousModel, arguments: Symbols, inputs: ca.SX | None = None
-) -> ca.SX:
+def predicted_state(model: ContinuousModel, arguments: Symbols, inputs: SX | None = None) -> SX:
     """Return the state after a step without contact, with other inputs if these are given."""
     sub_steps = round(MAX_WORLD_STEP / model.max_sub_step)
     inputs = arguments["inputs"] if inputs is None else inputs
@@ -293,11 +292,11 @@ def predicted_state(
 
 def predict_function(
     arguments: Symbols,
-    end: ca.SX,
-    twist: ca.SX,
-    endpoints: ca.SX,
-    may_fail: ca.SX,
-    **further_results: ca.SX,
+    end: SX,
+    twist: SX,
+    endpoints: SX,
+    may_fail: SX,
+    **further_results: SX,
 ) -> ca.Function:
     """Return `contact_predict`.
 
@@ -323,11 +322,11 @@ def predict_function(
 
 def correct_function(
     arguments: Symbols,
-    impulse: ca.SX,
-    corrected: ca.SX,
-    published: ca.SX,
-    observe: Callable[[ca.SX], ca.SX],
-    **further_results: ca.SX,
+    impulse: SX,
+    corrected: SX,
+    published: SX,
+    observe: Callable[[SX], SX],
+    **further_results: SX,
 ) -> ca.Function:
     """Return `contact_correct` of a body that forgets the impulse of the last step.
 
@@ -344,11 +343,11 @@ def correct_function(
 
 def impulse_correct_function(
     arguments: Symbols,
-    impulse: ca.SX,
-    magnitude: ca.SX,
-    corrected: ca.SX,
-    mean_velocity: ca.SX,
-    observe: Callable[[ca.SX], ca.SX],
+    impulse: SX,
+    magnitude: SX,
+    corrected: SX,
+    mean_velocity: SX,
+    observe: Callable[[SX], SX],
 ) -> ca.Function:
     """Return `contact_correct` of a body on which the impulse of the last step acts.
 
@@ -374,12 +373,12 @@ def impulse_correct_function(
     return named_function("contact_correct", arguments, results)
 
 
-def is_upside_down(orientation: ca.SX) -> ca.SX:
+def is_upside_down(orientation: SX) -> SX:
     """Return whether the up axis of a body points downwards."""
     return orientation[1] ** 2 + orientation[2] ** 2 > 0.5
 
 
-def step_status(end: ca.SX, endpoints: ca.SX, arguments: Symbols, may_fail: ca.SX) -> ca.SX:
+def step_status(end: SX, endpoints: SX, arguments: Symbols, may_fail: SX) -> SX:
     """Return the code (`interface.py`) of a predicted step; see `predict_function`."""
     magnitudes = ca.fabs(ca.vertcat(arguments["inputs"], arguments["environment_inputs"]))
     valid = ca.logic_and(ca.sum1(magnitudes) < ca.inf, ca.norm_2(end) < MAX_STATE_NORM)
@@ -390,12 +389,12 @@ def step_status(end: ca.SX, endpoints: ca.SX, arguments: Symbols, may_fail: ca.S
     )
 
 
-def contact_impulse(impulse: ca.SX) -> ca.SX:
+def contact_impulse(impulse: SX) -> SX:
     """Return the impulse (N s), with 0 in place of rounding errors; NaN remains NaN."""
     return ca.if_else(impulse <= IMPULSE_TOLERANCE, 0, impulse)
 
 
-def principal_pose(state: ca.SX, axes: ca.SX) -> ca.SX:
+def principal_pose(state: SX, axes: SX) -> SX:
     """Return the pose in Bullet of a body whose principal axes have the orientation `axes`.
 
     The orientation is that in the body frame (quaternion x y z w).
@@ -404,24 +403,24 @@ def principal_pose(state: ca.SX, axes: ca.SX) -> ca.SX:
     return ca.vertcat(state[0:3], orientation[1:4], orientation[0])
 
 
-def mean_twist(start: ca.SX, end: ca.SX, step: ca.SX) -> ca.SX:
+def mean_twist(start: SX, end: SX, step: SX) -> SX:
     """Return the constant twist (6) that moves a body from the pose of one state to another's."""
     turn = kinematics.quaternion_product(end[3:7], kinematics.conjugate(start[3:7]))
     return ca.vertcat((end[0:3] - start[0:3]) / step, kinematics.rotation_vector(turn) / step)
 
 
-def moved_pose(start: ca.SX, twist: ca.SX, step: ca.SX) -> tuple[ca.SX, ca.SX]:
+def moved_pose(start: SX, twist: SX, step: SX) -> tuple[SX, SX]:
     """Return position and quaternion, of about unit length, after a step with a constant twist."""
     rotation = kinematics.quaternion_from_rotation_vector(twist[3:6] * step)
     return start[0:3] + twist[0:3] * step, kinematics.quaternion_product(rotation, start[3:7])
 
 
-def gyroscopic_torque(inertia: ca.SX, rates: ca.SX) -> ca.SX:
+def gyroscopic_torque(inertia: SX, rates: SX) -> SX:
     """Return the torque (N m) that cancels the gyroscopic torque which Bullet adds to its body."""
     return ca.cross(rates, inertia @ rates)
 
 
-def impulse_of_twist(change: ca.SX, mass: ca.SX, inertia: ca.SX) -> tuple[ca.SX, ca.SX]:
+def impulse_of_twist(change: SX, mass: SX, inertia: SX) -> tuple[SX, SX]:
     """Return the impulse (6) that changes the twist of Bullet's body, and its magnitude.
 
     Args:
@@ -434,5 +433,5 @@ def impulse_of_twist(change: ca.SX, mass: ca.SX, inertia: ca.SX) -> tuple[ca.SX,
     """
     linear, angular = mass * change[0:3], inertia @ change[3:6]
     magnitude = contact_impulse(ca.norm_2(linear))
-    impulse = ca.if_else(magnitude > 0, ca.vertcat(linear, angular), ca.SX.zeros(TWIST_SIZE))
+    impulse = ca.if_else(magnitude > 0, ca.vertcat(linear, angular), SX.zeros(TWIST_SIZE))
     return impulse + 0 * magnitude, magnitude  # NaN remains NaN

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from itertools import zip_longest
 
 import casadi as ca
+from casadi import SX
 
 _SINE = tuple((-1) ** k / math.factorial(2 * k + 1) for k in range(12))
 _COSINE = tuple((-1) ** k / math.factorial(2 * k) for k in range(9))
@@ -29,12 +30,12 @@ _ROUNDING_MAGIC = 1.5 * 2.0**52
 _SQUARINGS = 8
 
 
-def clamp(value: ca.SX) -> ca.SX:
+def clamp(value: SX) -> SX:
     """Return the value limited to 0 ... 1."""
     return ca.fmin(ca.fmax(value, 0), 1)
 
 
-def sine_and_cosine(angle: ca.SX) -> tuple[ca.SX, ca.SX]:
+def sine_and_cosine(angle: SX) -> tuple[SX, SX]:
     """Return sin and cos of |angle| < 1e6 rad.
 
     Reduce modulo 2 pi, evaluate the series at a quarter, double twice.
@@ -48,13 +49,13 @@ def sine_and_cosine(angle: ca.SX) -> tuple[ca.SX, ca.SX]:
     return sine, cosine
 
 
-def sine_of_right_angle_share(share: ca.SX) -> ca.SX:
+def sine_of_right_angle_share(share: SX) -> SX:
     """Return sin(share pi / 2) for |share| <= 1, accurate to 1e-15."""
     angle = share * (math.pi / 2)
     return angle * _polynomial(_SINE, angle * angle)
 
 
-def arctangent(y: ca.SX, x: ca.SX) -> ca.SX:
+def arctangent(y: SX, x: SX) -> SX:
     """Return atan2(y, x) (rad) for x >= 0, accurate to 1e-15, and 0 at the origin.
 
     The angle is reduced to the nearest of 0, 45 and 90 degrees, and the series is evaluated for the
@@ -69,7 +70,7 @@ def arctangent(y: ca.SX, x: ca.SX) -> ca.SX:
     return ca.sign(y) * (base + rest * _polynomial(_ARCTANGENT, rest * rest))
 
 
-def exponential(x: ca.SX) -> ca.SX:
+def exponential(x: SX) -> SX:
     """Return exp(x), accurate to 1e-13 for |x| < 3.
 
     Evaluate the series at x / 256, square eight times.
@@ -80,12 +81,12 @@ def exponential(x: ca.SX) -> ca.SX:
     return power
 
 
-def logarithm(x: ca.SX) -> ca.SX:
+def logarithm(x: SX) -> SX:
     """Return ln(x) for 0.7 <= x <= 2^31, accurate to 1e-15.
 
     Halve x to about 1, then evaluate the series of 2 artanh.
     """
-    halvings = ca.SX(0)
+    halvings = SX(0)
     for power in (16, 8, 4, 2, 1):
         large = x > 2.0**power / math.sqrt(2)
         x, halvings = x * ca.if_else(large, 2.0**-power, 1), halvings + ca.if_else(large, power, 0)
@@ -93,16 +94,16 @@ def logarithm(x: ca.SX) -> ca.SX:
     return halvings * math.log(2) + ratio * _polynomial(_AREA_TANGENT, ratio * ratio)
 
 
-def _polynomial(coefficients: Sequence[float], x: ca.SX) -> ca.SX:
+def _polynomial(coefficients: Sequence[float], x: SX) -> SX:
     """Evaluate a polynomial, lowest power first, by Estrin's scheme.
 
     It adds pairs of terms and squares x, so that its operations can run in parallel, while those of
     Horner's scheme are one chain (Estrin, "Organization of Computer Systems", 1960).
     """
-    terms = [ca.SX(coefficient) for coefficient in coefficients]
+    terms = [SX(coefficient) for coefficient in coefficients]
     while len(terms) > 1:
         terms = [
-            low + high * x for low, high in zip_longest(terms[::2], terms[1::2], fillvalue=ca.SX(0))
+            low + high * x for low, high in zip_longest(terms[::2], terms[1::2], fillvalue=SX(0))
         ]
         x = x * x
     return terms[0]

@@ -6,25 +6,26 @@ Quaternions are (w, x, y, z) and rotate body vectors into the world frame.
 from __future__ import annotations
 
 import casadi as ca
+from casadi import SX
 
 
-def quaternion_product(a: ca.SX, b: ca.SX) -> ca.SX:
+def quaternion_product(a: SX, b: SX) -> SX:
     """Return the quaternion product a * b: rotation b followed by rotation a."""
     w, v = a[0], a[1:4]
     return ca.vertcat(w * b[0] - ca.dot(v, b[1:4]), w * b[1:4] + b[0] * v + ca.cross(v, b[1:4]))
 
 
-def conjugate(q: ca.SX) -> ca.SX:
+def conjugate(q: SX) -> SX:
     """Return the conjugate, the inverse rotation of a unit quaternion."""
     return ca.vertcat(q[0], -q[1:4])
 
 
-def normalised_quaternion(q: ca.SX) -> ca.SX:
+def normalised_quaternion(q: SX) -> SX:
     """Return q / |q|."""
     return q * (1 / ca.norm_2(q))
 
 
-def rotation_matrix(q: ca.SX) -> ca.SX:
+def rotation_matrix(q: SX) -> SX:
     """Return the rotation matrix (3, 3), body to world frame, of a unit quaternion."""
     w, x, y, z = ca.vertsplit(q)
     return ca.vertcat(
@@ -34,24 +35,24 @@ def rotation_matrix(q: ca.SX) -> ca.SX:
     )
 
 
-def quaternion_rate(q: ca.SX, rates: ca.SX) -> ca.SX:
+def quaternion_rate(q: SX, rates: SX) -> SX:
     """Return the time derivative of a quaternion for an angular velocity (rad/s, body frame)."""
     return quaternion_product(q, ca.vertcat(0, rates)) / 2
 
 
-def quaternion_about_z(angle: ca.SX) -> ca.SX:
+def quaternion_about_z(angle: SX) -> SX:
     """Return the rotation by an angle (rad) about the z axis."""
     return ca.vertcat(ca.cos(angle / 2), 0, 0, ca.sin(angle / 2))
 
 
-def quaternion_from_euler(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
+def quaternion_from_euler(roll: SX, pitch: SX, yaw: SX) -> SX:
     """Return the quaternion of ZYX Euler angles (rad)."""
     about_x = ca.vertcat(ca.cos(roll / 2), ca.sin(roll / 2), 0, 0)
     about_y = ca.vertcat(ca.cos(pitch / 2), 0, ca.sin(pitch / 2), 0)
     return quaternion_product(quaternion_about_z(yaw), quaternion_product(about_y, about_x))
 
 
-def euler_angles(q: ca.SX) -> ca.SX:
+def euler_angles(q: SX) -> SX:
     """Return the ZYX Euler angles roll, pitch and yaw (rad), shape (3,)."""
     r = rotation_matrix(q)
     return ca.vertcat(
@@ -61,7 +62,7 @@ def euler_angles(q: ca.SX) -> ca.SX:
     )
 
 
-def euler_to_body_rates(roll: ca.SX, pitch: ca.SX) -> ca.SX:
+def euler_to_body_rates(roll: SX, pitch: SX) -> SX:
     """Return the matrix (3, 3) from the rates of roll, pitch and yaw to those of the body.
 
     The latter are p, q, r in the body frame (Fossen 2021, Handbook of Marine Craft Hydrodynamics
@@ -70,18 +71,18 @@ def euler_to_body_rates(roll: ca.SX, pitch: ca.SX) -> ca.SX:
     cos, sin = ca.cos(roll), ca.sin(roll)
     about_y = ca.vertcat(0, cos, -sin)
     about_z = ca.vertcat(-ca.sin(pitch), sin * ca.cos(pitch), cos * ca.cos(pitch))
-    return ca.horzcat(ca.SX([1, 0, 0]), about_y, about_z)
+    return ca.horzcat(SX([1, 0, 0]), about_y, about_z)
 
 
-def body_to_euler_rates(roll: ca.SX, pitch: ca.SX) -> ca.SX:
+def body_to_euler_rates(roll: SX, pitch: SX) -> SX:
     """Return the inverse of `euler_to_body_rates`, singular at a pitch of 90 degrees."""
     cos, sin, tan_pitch = ca.cos(roll), ca.sin(roll), ca.tan(pitch)
     about_y = ca.vertcat(sin * tan_pitch, cos, sin / ca.cos(pitch))
     about_z = ca.vertcat(cos * tan_pitch, -sin, cos / ca.cos(pitch))
-    return ca.horzcat(ca.SX([1, 0, 0]), about_y, about_z)
+    return ca.horzcat(SX([1, 0, 0]), about_y, about_z)
 
 
-def rotation_vector(q: ca.SX) -> ca.SX:
+def rotation_vector(q: SX) -> SX:
     """Return the rotation vector (axis times angle, rad) with the smaller angle.
 
     By a series for tiny angles.
@@ -95,7 +96,7 @@ def rotation_vector(q: ca.SX) -> ca.SX:
     return factor * shorter[1:4]
 
 
-def quaternion_from_rotation_vector(vector: ca.SX) -> ca.SX:
+def quaternion_from_rotation_vector(vector: SX) -> SX:
     """Return the quaternion of a rotation vector (axis times angle, rad).
 
     By a series for tiny angles.
@@ -110,7 +111,7 @@ def quaternion_from_rotation_vector(vector: ca.SX) -> ca.SX:
     return ca.vertcat(ca.cos(angle / 2), factor * vector)
 
 
-def motion_outputs(position: ca.SX, orientation: ca.SX, velocity: ca.SX, rates: ca.SX) -> ca.SX:
+def motion_outputs(position: SX, orientation: SX, velocity: SX, rates: SX) -> SX:
     """Return the motion outputs of a vehicle (`interface.MOTION_OUTPUTS`).
 
     Args:

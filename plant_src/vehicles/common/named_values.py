@@ -8,21 +8,22 @@ from functools import cached_property
 from itertools import accumulate
 
 import casadi as ca
+from casadi import SX
 
 from cosim.core.component import Variable
 
 
-class NamedValues(Mapping[str, ca.SX]):
+class NamedValues(Mapping[str, SX]):
     """Expressions by name, in a fixed order.
 
     The name of a group, for example "wind", returns its scalars "wind.x", "wind.y" and "wind.z" as
     one vector. Iteration yields the single names only.
     """
 
-    def __init__(self, values: Mapping[str, ca.SX]):
+    def __init__(self, values: Mapping[str, SX]):
         self._values = dict(values)
 
-    def __getitem__(self, name: str) -> ca.SX:
+    def __getitem__(self, name: str) -> SX:
         if name in self._values:
             return self._values[name]
         group = [
@@ -40,7 +41,7 @@ class NamedValues(Mapping[str, ca.SX]):
     def __len__(self) -> int:
         return len(self._values)
 
-    def vector(self) -> ca.SX:
+    def vector(self) -> SX:
         """Return all values as one column vector, matrices column by column."""
         return ca.vertcat(*(ca.vec(value) for value in self._values.values()))
 
@@ -50,30 +51,30 @@ def variables_of(variables: Sequence[Variable], causality: str) -> list[Variable
     return [variable for variable in variables if variable.causality == causality]
 
 
-def values_by_name(vector: ca.SX, variables: Sequence[Variable]) -> NamedValues:
+def values_by_name(vector: SX, variables: Sequence[Variable]) -> NamedValues:
     """Return the parts of `vector` by name; it holds the values of `variables` in order."""
     return _split(
         vector, {variable.name: (len(variable.scalar_names), 1) for variable in variables}
     )
 
 
-def vector_rows(values: NamedValues, group: str) -> ca.SX:
+def vector_rows(values: NamedValues, group: str) -> SX:
     """Return the vectors `group.x|y|z` of several parts, shape (parts, 3)."""
     return ca.horzcat(*(values[f"{group}.{axis}"] for axis in "xyz"))
 
 
-def square_matrix(elements: ca.SX) -> ca.SX:
+def square_matrix(elements: SX) -> SX:
     """Return the matrix whose rows follow each other in `elements`."""
     size = round(elements.numel() ** 0.5)
     return ca.reshape(elements, size, size).T
 
 
-def initial_parameters(parameters: NamedValues) -> dict[str, ca.SX]:
+def initial_parameters(parameters: NamedValues) -> dict[str, SX]:
     """Return the parameters `initial.*`."""
     return {name: value for name, value in parameters.items() if name.startswith("initial.")}
 
 
-def _split(vector: ca.SX, shapes: Mapping[str, tuple[int, int]]) -> NamedValues:
+def _split(vector: SX, shapes: Mapping[str, tuple[int, int]]) -> NamedValues:
     """Cut a vector into consecutive matrices of these shapes."""
     parts = ca.vertsplit(
         vector, [0, *accumulate(rows * columns for rows, columns in shapes.values())]
@@ -96,20 +97,20 @@ class ConstantsMap:
     """
 
     variables: Sequence[Variable]
-    derive: Callable[[NamedValues], Mapping[str, ca.SX]]
+    derive: Callable[[NamedValues], Mapping[str, SX]]
 
-    def vector(self, parameters: ca.SX) -> ca.SX:
+    def vector(self, parameters: SX) -> SX:
         """Return the constants of a vector of parameters."""
         return NamedValues(self.derive(values_by_name(parameters, self._parameters))).vector()
 
-    def by_name(self, constants: ca.SX) -> NamedValues:
+    def by_name(self, constants: SX) -> NamedValues:
         """Return the parts of a vector that `vector` made."""
         return _split(constants, self.shapes)
 
     @cached_property
     def shapes(self) -> dict[str, tuple[int, int]]:
         """Rows and columns of each constant."""
-        symbols = ca.SX.sym(
+        symbols = SX.sym(
             "parameters", sum(len(variable.scalar_names) for variable in self._parameters)
         )
         return {

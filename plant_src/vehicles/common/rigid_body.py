@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import casadi as ca
+from casadi import SX
 
 from cosim.export.equations.model import ContinuousModel
 
@@ -26,11 +27,11 @@ RIGID_BODY_STATE_COUNT = len(FREE_STATES)
 class RigidBody(NamedTuple):
     """Mass (kg), inertia about the centre of mass (kg m2, body frame, (3, 3)) and its inverse."""
 
-    mass: ca.SX
-    inertia: ca.SX
-    inverse_inertia: ca.SX
+    mass: SX
+    inertia: SX
+    inverse_inertia: SX
 
-    def inertia_in_world(self, orientation: ca.SX) -> ca.SX:
+    def inertia_in_world(self, orientation: SX) -> SX:
         """Return the inertia (kg m2) in world axes."""
         to_world = kinematics.rotation_matrix(orientation)
         return to_world @ self.inertia @ to_world.T
@@ -43,22 +44,22 @@ def rigid_body(constants: NamedValues) -> RigidBody:
     )
 
 
-def initial_rigid_state(initial: NamedValues) -> ca.SX:
+def initial_rigid_state(initial: NamedValues) -> SX:
     """Return the states of the rigid body at the start from the parameters `initial.*`."""
     orientation = kinematics.quaternion_about_z(initial["initial.yaw"])
     velocity = kinematics.rotation_matrix(orientation) @ initial["initial.velocity_body"]
     return ca.vertcat(initial["initial.position"], orientation, velocity, initial["initial.rates"])
 
 
-def symmetric_matrix(elements: ca.SX) -> ca.SX:
+def symmetric_matrix(elements: SX) -> SX:
     """Return the symmetric matrix (3, 3) with the elements xx, yy, zz, xy, xz, yz."""
     xx, yy, zz, xy, xz, yz = ca.vertsplit(elements)
     return ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
 
 
 def rigid_body_rate(
-    body: RigidBody, gravity: ca.SX, state: ca.SX, inputs: NamedValues, force: ca.SX, torque: ca.SX
-) -> ca.SX:
+    body: RigidBody, gravity: SX, state: SX, inputs: NamedValues, force: SX, torque: SX
+) -> SX:
     """Return the time derivative of the rigid-body states.
 
     Args:
@@ -83,9 +84,7 @@ def rigid_body_rate(
     )
 
 
-def lagging_speeds(
-    speed: ca.SX, target: ca.SX, lag: ca.SX, step: ca.SX
-) -> tuple[ca.SX, ca.SX, ca.SX]:
+def lagging_speeds(speed: SX, target: SX, lag: SX, step: SX) -> tuple[SX, SX, SX]:
     """Return speeds with a first-order lag at the start, the middle and the end of a step.
 
     They are the exact solution for held commands: the difference to the command decays by
@@ -104,23 +103,23 @@ def lagging_speeds(
     return start, middle, end
 
 
-def normalised_state(state: ca.SX) -> ca.SX:
+def normalised_state(state: SX) -> SX:
     """Return the rigid-body states with a unit quaternion."""
     return ca.vertcat(
         state[0:3], kinematics.normalised_quaternion(state[3:7]), state[7:RIGID_BODY_STATE_COUNT]
     )
 
 
-def motion_of_state(state: ca.SX) -> ca.SX:
+def motion_of_state(state: SX) -> SX:
     """Return the published motion (`interface.MOTION_OUTPUTS`)."""
     return kinematics.motion_outputs(
         state[0:3], state[3:7], state[7:10], state[10:RIGID_BODY_STATE_COUNT]
     )
 
 
-def with_world_outputs(motion: ca.SX) -> ca.SX:
+def with_world_outputs(motion: SX) -> SX:
     """Return all outputs of a plant FMU: its motion, and 0 for what only a world computes."""
-    return ca.vertcat(motion, ca.SX.zeros(len(WORLD_OUTPUTS)))
+    return ca.vertcat(motion, SX.zeros(len(WORLD_OUTPUTS)))
 
 
 @dataclass(frozen=True)
@@ -131,11 +130,9 @@ class SteppedModel(ContinuousModel):
         step: Function of state, inputs, constants and length of a step (s) to the next state.
     """
 
-    step: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX] = field(kw_only=True)
+    step: Callable[[SX, SX, SX, SX], SX] = field(kw_only=True)
 
-    def integrate(
-        self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1
-    ) -> ca.SX:
+    def integrate(self, state: SX, inputs: SX, parameters: SX, step: SX, sub_steps: int = 1) -> SX:
         """Return the state after `step` (s) with held inputs, in equal sub-steps."""
         for _ in range(sub_steps):
             state = self.step(state, inputs, parameters, step / sub_steps)

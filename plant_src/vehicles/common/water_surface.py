@@ -7,6 +7,7 @@ The elevation is the sum over components of a cos(k (x cos d + y sin d) - w t + 
 from __future__ import annotations
 
 import casadi as ca
+from casadi import SX
 
 from cosim.export.equations.c_code import sum_over_rows
 
@@ -23,7 +24,7 @@ def _elevation_term() -> ca.Function:
 
     (x, y, time) and a row of the table to the elevation.
     """
-    place, row = ca.SX.sym("place", 3), ca.SX.sym("row", WAVE_COLUMNS)
+    place, row = SX.sym("place", 3), SX.sym("row", WAVE_COLUMNS)
     amplitude, kx, ky, frequency, phase = ca.vertsplit(row)
     angle = kx * place[0] + ky * place[1] - frequency * place[2] + phase
     return ca.Function("elevation_term", [place, row], [amplitude * sine_and_cosine(angle)[1]])
@@ -35,8 +36,8 @@ SURFACE_SUM = sum_over_rows("surface", _elevation_term(), MAX_WAVE_COMPONENTS)
 
 def create_elevation_function() -> ca.Function:
     """Return the function from (x, y, time), number and table of components to the elevation."""
-    place, count = ca.SX.sym("place", 3), ca.SX.sym("count")
-    rows = ca.SX.sym("rows", MAX_WAVE_COMPONENTS, WAVE_COLUMNS)
+    place, count = SX.sym("place", 3), SX.sym("count")
+    rows = SX.sym("rows", MAX_WAVE_COMPONENTS, WAVE_COLUMNS)
     return ca.Function(
         "water_elevation",
         [place, count, ca.vec(rows)],

@@ -41,6 +41,7 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
+from casadi import SX
 
 from cosim.core.component import Variable
 from cosim.export.equations.c_code import Callee
@@ -86,9 +87,9 @@ class SpinningRotors(NamedTuple):
     Speeds (rad/s) that act on air, angular momentum (N m s) and its rate (N m), body frame.
     """
 
-    aerodynamic_speed: ca.SX
-    momentum: ca.SX
-    momentum_rate: ca.SX
+    aerodynamic_speed: SX
+    momentum: SX
+    momentum_rate: SX
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,7 @@ class MultirotorEquations:
         """Functions of all rotors."""
         return RotorFunctions(self.slots)
 
-    def derive_constants(self, parameters: NamedValues) -> dict[str, ca.SX]:
+    def derive_constants(self, parameters: NamedValues) -> dict[str, SX]:
         """Return the constants of the equations.
 
         The parameters, the inverse of the inertia tensor, the tables of the rotors, and the largest
@@ -140,17 +141,17 @@ class MultirotorEquations:
             * ca.repmat(turning, 3, 1),
         }
 
-    def _inputs(self, vector: ca.SX) -> NamedValues:
+    def _inputs(self, vector: SX) -> NamedValues:
         return values_by_name(vector, variables_of(self.variables, "input"))
 
-    def initial_state(self, constants: ca.SX) -> ca.SX:
+    def initial_state(self, constants: SX) -> SX:
         """Return the state at the start."""
         initial = self.constants.by_name(constants)
         count, speed = initial["rotor_count"], initial["initial_rotor_speed"]
         rotors = [ca.if_else(count > k, speed, 0) for k in range(self.slots)]
         return ca.vertcat(initial_rigid_state(initial), *rotors)
 
-    def rate(self, state: ca.SX, inputs: ca.SX, constants: ca.SX) -> ca.SX:
+    def rate(self, state: SX, inputs: SX, constants: SX) -> SX:
         """Return the time derivative of the state in air and water; the rotors lag."""
         given, known = self._inputs(inputs), self.constants.by_name(constants)
         speed, lag = state[RIGID_BODY_STATE_COUNT:], known["rotor_time_constant"]
@@ -162,9 +163,7 @@ class MultirotorEquations:
             ca.if_else(lag > 0, (target - speed) / lag, 0),
         )
 
-    def step_without_effects(
-        self, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX
-    ) -> ca.SX:
+    def step_without_effects(self, state: SX, inputs: SX, constants: SX, step: SX) -> SX:
         """Return the state after a step (s) with all effects off."""
         given, known = self._inputs(inputs), self.constants.by_name(constants)
         body, speed = rigid_body(known), self._commanded_speeds(given, known)
@@ -180,13 +179,13 @@ class MultirotorEquations:
 
     def step_with_effects(
         self,
-        state: ca.SX,
-        inputs: ca.SX,
-        constants: ca.SX,
-        step: ca.SX,
+        state: SX,
+        inputs: SX,
+        constants: SX,
+        step: SX,
         *,
         in_water: bool = False,
-    ) -> ca.SX:
+    ) -> SX:
         """Return the state after a step (s) with all effects, in air or with the loads of water."""
         body_rate = self._rate_in_water if in_water else self._body_rate
         given, known = self._inputs(inputs), self.constants.by_name(constants)
@@ -206,18 +205,18 @@ class MultirotorEquations:
         )
         return ca.vertcat(normalised_state(body), end)
 
-    def _commanded_speeds(self, inputs: NamedValues, constants: NamedValues) -> ca.SX:
+    def _commanded_speeds(self, inputs: NamedValues, constants: NamedValues) -> SX:
         """Return the commanded rotor speeds (rad/s), limited to 0 ... `max_rotor_speed`."""
         return ca.fmin(ca.fmax(inputs["rotor_speed"], 0), constants["max_rotor_speed"])
 
     def _body_rate(
         self,
-        state: ca.SX,
+        state: SX,
         rotors: SpinningRotors,
-        reductions: ca.SX,
+        reductions: SX,
         inputs: NamedValues,
         constants: NamedValues,
-    ) -> ca.SX:
+    ) -> SX:
         """Return the time derivative of the rigid-body states in air with all effects."""
         force, torque = self.rotor_functions.aerodynamic_loads(
             state, rotors.aerodynamic_speed, reductions, inputs, constants
@@ -229,12 +228,12 @@ class MultirotorEquations:
 
     def _rate_in_water(
         self,
-        state: ca.SX,
+        state: SX,
         rotors: SpinningRotors,
-        reductions: ca.SX,
+        reductions: SX,
         inputs: NamedValues,
         constants: NamedValues,
-    ) -> ca.SX:
+    ) -> SX:
         """Return the time derivative of the rigid-body states with the loads of water."""
         emerged = emerged_fractions(state, inputs, constants)
         wet = rotors._replace(aerodynamic_speed=rotors.aerodynamic_speed * emerged)
@@ -242,7 +241,7 @@ class MultirotorEquations:
         return add_water_loads(rate, state, inputs, constants)
 
 
-def _spinning_rotors(speed: ca.SX, target: ca.SX, constants: NamedValues) -> SpinningRotors:
+def _spinning_rotors(speed: SX, target: SX, constants: NamedValues) -> SpinningRotors:
     """Return rotors with their first-order rates towards the commands."""
     lag = constants["rotor_time_constant"]
     rate = ca.if_else(lag > 0, (target - speed) / lag, 0)

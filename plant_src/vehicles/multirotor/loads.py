@@ -41,6 +41,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
+from casadi import SX
 
 from cosim.export.equations.c_code import Callee, sum_over_rows
 
@@ -71,7 +72,7 @@ _ADDED_MASS_COEFFICIENT = 0.68
 _SMALLEST_HEIGHT = 1e-3  # m, replaces the height of a hull without size
 
 
-def rotor_table(parameters: NamedValues, slots: int) -> ca.SX:
+def rotor_table(parameters: NamedValues, slots: int) -> SX:
     """Return position, axis, thrust and torque coefficient of each rotor.
 
     Its shape is (table_rows(slots), ROTOR_TABLE_COLUMNS).
@@ -82,10 +83,10 @@ def rotor_table(parameters: NamedValues, slots: int) -> ca.SX:
         parameters["thrust_coefficient"],
         parameters["torque_coefficient"],
     )
-    return ca.vertcat(rows, ca.SX.zeros(table_rows(slots) - slots, ROTOR_TABLE_COLUMNS))
+    return ca.vertcat(rows, SX.zeros(table_rows(slots) - slots, ROTOR_TABLE_COLUMNS))
 
 
-def still_air_loads(table: ca.SX, slots: int) -> ca.SX:
+def still_air_loads(table: SX, slots: int) -> SX:
     """Return the matrix (6, slots) from squared rotor speeds to force (N) and torque (N m)."""
     loads = []
     for k in range(slots):
@@ -111,8 +112,8 @@ def _rotor_term() -> ca.Function:
     translational lift, rotor radius), (speed, reduction of the inflow by the ground effect) and the
     row of the rotor.
     """
-    common, moving = ca.SX.sym("common", 13), ca.SX.sym("moving", 2)
-    row = ca.SX.sym("row", ROTOR_TABLE_COLUMNS)
+    common, moving = SX.sym("common", 13), SX.sym("moving", 2)
+    row = SX.sym("row", ROTOR_TABLE_COLUMNS)
     air, rates, drag = ca.vertsplit(common[0:9], 3)
     gain, wake, lift, radius = ca.vertsplit(common[9:13])
     (speed, reduction), (position, axis) = ca.vertsplit(moving), ca.vertsplit(row[0:6], 3)
@@ -151,15 +152,15 @@ class RotorFunctions:
         (slots,); only the elements with a rotor are of use.
         """
         common, x, y = (
-            ca.SX.sym("common", 3),
-            ca.SX.sym("x", self.slots),
-            ca.SX.sym("y", self.slots),
+            SX.sym("common", 3),
+            SX.sym("x", self.slots),
+            SX.sym("y", self.slots),
         )
         height, radius, count = ca.vertsplit(common)
         z = ca.fmax(height, MIN_HEIGHT_RATIO * radius)
         reductions = []
         for i in range(self.slots):
-            reduction = ca.SX(0)
+            reduction = SX(0)
             for j in range(self.slots):
                 d2 = (x[i] - x[j]) ** 2 + (y[i] - y[j]) ** 2 + 4 * z**2
                 reduction += ca.if_else(count > j, radius**2 / 2 * z / (d2 * ca.sqrt(d2)), 0)
@@ -176,9 +177,9 @@ class RotorFunctions:
         Its arguments are the matrix of `still_air_loads`, the number of rotors and the speeds
         (rad/s).
         """
-        matrix, speed = ca.SX.sym("matrix", 6, self.slots), ca.SX.sym("speed", self.slots)
+        matrix, speed = SX.sym("matrix", 6, self.slots), SX.sym("speed", self.slots)
         function = ca.Function(
-            "still_air_load", [matrix, ca.SX.sym("count"), speed], [matrix @ speed**2]
+            "still_air_load", [matrix, SX.sym("count"), speed], [matrix @ speed**2]
         )
         return Callee(function, _STILL_AIR_LOAD_C)
 
@@ -187,7 +188,7 @@ class RotorFunctions:
         """Sum of the loads of all rotors in moving air."""
         return sum_over_rows("rotor_loads", _rotor_term(), table_rows(self.slots))
 
-    def ground_reductions(self, inputs: NamedValues, constants: NamedValues) -> ca.SX:
+    def ground_reductions(self, inputs: NamedValues, constants: NamedValues) -> SX:
         """Return the relative reduction of each hovering rotor's inflow, shape (slots,)."""
         common = ca.vertcat(
             inputs["ground_distance"], constants["rotor_radius"], constants["rotor_count"]
@@ -198,12 +199,12 @@ class RotorFunctions:
 
     def aerodynamic_loads(
         self,
-        state: ca.SX,
-        speed: ca.SX,
-        reductions: ca.SX,
+        state: SX,
+        speed: SX,
+        reductions: SX,
         inputs: NamedValues,
         constants: NamedValues,
-    ) -> tuple[ca.SX, ca.SX]:
+    ) -> tuple[SX, SX]:
         """Return force (N) and torque (N m) of rotors and body in moving air, body frame.
 
         Args:
@@ -214,7 +215,7 @@ class RotorFunctions:
             constants: Constants of the equations.
         """
         air = kinematics.rotation_matrix(state[3:7]).T @ (state[7:10] - inputs["wind"])
-        padding = ca.SX.zeros(table_rows(self.slots) - self.slots)
+        padding = SX.zeros(table_rows(self.slots) - self.slots)
         moving = ca.vertcat(speed, padding, reductions, padding)
         gain = constants["ground_effect"] * inputs["ground_share"]
         radius, lift = constants["rotor_radius"], constants["translational_lift"]
@@ -226,7 +227,7 @@ class RotorFunctions:
         return load[0:3] - ca.norm_2(air) * constants["body_drag"] * air, load[3:6]
 
 
-def gyroscopic_torque(rates: ca.SX, momentum: ca.SX, momentum_rate: ca.SX) -> ca.SX:
+def gyroscopic_torque(rates: SX, momentum: SX, momentum_rate: SX) -> SX:
     """Return the torque (N m, body frame) of spinning and accelerating rotors on a rotating body.
 
     Args:
@@ -251,9 +252,7 @@ d2 = x * x + y * y + 4 * z * z;
 """
 
 
-def thrust_factor(
-    reduction: ca.SX, gain: ca.SX, thrust: ca.SX, air_speed_squared: ca.SX, wake: ca.SX
-) -> ca.SX:
+def thrust_factor(reduction: SX, gain: SX, thrust: SX, air_speed_squared: SX, wake: SX) -> SX:
     """Return the ratio of a rotor's thrust to that in free air.
 
     Args:
@@ -267,16 +266,14 @@ def thrust_factor(
     return 1 + gain * (1 / (1 - ca.fmin(reduction * remaining, MAX_REDUCTION)) - 1)
 
 
-def emerged_fractions(state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
+def emerged_fractions(state: SX, inputs: NamedValues, constants: NamedValues) -> SX:
     """Return the fraction of each rotor's speed that acts on air, shape (slots,)."""
     up = kinematics.rotation_matrix(state[3:7])[2, :]
     heights = state[2] + vector_rows(constants, "rotor_position") @ up.T
     return clamp((heights - inputs["water_level"]) / constants["rotor_radius"] + 0.5)
 
 
-def add_water_loads(
-    rate: ca.SX, state: ca.SX, inputs: NamedValues, constants: NamedValues
-) -> ca.SX:
+def add_water_loads(rate: SX, state: SX, inputs: NamedValues, constants: NamedValues) -> SX:
     """Return the rate of the rigid-body states with the loads of the water.
 
     Args:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 
 import casadi as ca
+from casadi import SX
 
 from cosim.export.equations.c_code import Callee, call_in_c
 
@@ -58,7 +59,7 @@ def create_surroundings_function() -> tuple[ca.Function, Callee]:
         "surface_rows": SURFACE_COLUMNS,
     }
     arguments = pose, disc, sea, waves, count, row = [
-        ca.SX.sym(name, size) for name, size in sizes.items()
+        SX.sym(name, size) for name, size in sizes.items()
     ]
     centre_of_rotors = pose[0:3] + kinematics.rotation_matrix(pose[3:7]) @ disc[0:3]
     point = ca.Function("disc_centre", [pose, disc], [centre_of_rotors])
@@ -91,8 +92,8 @@ def _surface_function() -> ca.Function:
     Its arguments are a point (m), a radius (m) and a row of the table, its results the height (m)
     of the plane and its share. The share is 0 if the rectangle is beside the disc or upside down.
     """
-    point, radius = ca.SX.sym("point", 3), ca.SX.sym("radius")
-    row = ca.SX.sym("row", SURFACE_COLUMNS)
+    point, radius = SX.sym("point", 3), SX.sym("radius")
+    row = SX.sym("row", SURFACE_COLUMNS)
     rotation, offset = kinematics.rotation_matrix(row[5:9]), point[0:2] - row[2:4]
     normal = rotation[:, 2]
     upright = normal[2] > 0
@@ -107,13 +108,13 @@ def _surface_function() -> ca.Function:
     )
 
 
-def _share_of_strip(half_width: ca.SX, position: ca.SX, radius: ca.SX) -> ca.SX:
+def _share_of_strip(half_width: SX, position: SX, radius: SX) -> SX:
     """Return the share of a disc at a position (m) above a strip around 0."""
     near, far = half_width - ca.fabs(position), half_width + ca.fabs(position)
     return ca.fmax(_share_of_half_plane(near / radius) + _share_of_half_plane(far / radius) - 1, 0)
 
 
-def _share_of_half_plane(ratio: ca.SX) -> ca.SX:
+def _share_of_half_plane(ratio: SX) -> SX:
     """Return the share of a disc whose centre is `ratio` radii inside the edge of a half-plane."""
     root = ca.sqrt(ca.fmax(1 - ratio * ratio, 0))
     at_the_edge = 0.5 + (ratio * root + arctangent(ratio, root)) / math.pi

@@ -9,6 +9,7 @@ from __future__ import annotations
 from functools import partial
 
 import casadi as ca
+from casadi import SX
 
 from cosim.export.equations.c_code import call_in_c
 from cosim.export.fmu.block import Block
@@ -43,16 +44,16 @@ from .loads import (
 )
 
 STRIPS = equivalent_strips(
-    ca.SX(p.CENTRE_OF_FLOTATION),
-    (ca.SX(p.TRANSVERSE_MOMENT), ca.SX(p.LONGITUDINAL_MOMENT)),
-    ca.SX(p.WATERPLANE_AREA),
+    SX(p.CENTRE_OF_FLOTATION),
+    (SX(p.TRANSVERSE_MOMENT), SX(p.LONGITUDINAL_MOMENT)),
+    SX(p.WATERPLANE_AREA),
 )
 
 #: steps of the iteration for the equilibrium
 _EQUILIBRIUM_STEPS = 40
 
 _WEIGHT_DENSITY = p.WATER_DENSITY * p.GRAVITY  # N/m3
-_MOMENTS = ca.SX([p.TRANSVERSE_MOMENT, p.LONGITUDINAL_MOMENT])
+_MOMENTS = SX([p.TRANSVERSE_MOMENT, p.LONGITUDINAL_MOMENT])
 
 #: smallest draught at rest of a station (m), for payloads that lift it out of the water
 _MIN_DRAUGHT = 1e-3
@@ -61,7 +62,7 @@ _DEPTHS = [draught + p.PONTOON_TOP for draught in p.STATION_DRAUGHTS]
 _MEAN_DEPTH = sum(_DEPTHS) / STATION_COUNT
 
 
-def resting_pontoons(draughts: ca.SX, mean_draught: ca.SX) -> TwinHull:
+def resting_pontoons(draughts: SX, mean_draught: SX) -> TwinHull:
     """Return the pontoons.
 
     Args:
@@ -72,20 +73,20 @@ def resting_pontoons(draughts: ca.SX, mean_draught: ca.SX) -> TwinHull:
     weights = STATION_COUNT / ca.sum1(positive) * positive
     stations = zip(_DEPTHS, ca.vertsplit(positive), ca.vertsplit(weights), strict=True)
     boxes = [
-        Box(ca.SX(depth), ca.SX(p.PONTOON_TOP - depth / 2), draught, depth / _MEAN_DEPTH, weight)
+        Box(SX(depth), SX(p.PONTOON_TOP - depth / 2), draught, depth / _MEAN_DEPTH, weight)
         for depth, draught, weight in stations
     ]
     return TwinHull(
         STRIPS,
-        ca.SX(p.PONTOON_BEAM),
+        SX(p.PONTOON_BEAM),
         mean_draught,
-        ca.SX(_MEAN_DEPTH),
-        ca.SX(p.WATERPLANE_AREA),
+        SX(_MEAN_DEPTH),
+        SX(p.WATERPLANE_AREA),
         boxes,
     )
 
 
-def station_draughts(equilibrium: ca.SX) -> ca.SX:
+def station_draughts(equilibrium: SX) -> SX:
     """Return the draughts of the stations (m) for height of O (m), roll and pitch (rad) at rest."""
     up = upward_axis(equilibrium)
     draughts = [
@@ -95,10 +96,10 @@ def station_draughts(equilibrium: ca.SX) -> ca.SX:
     return ca.vertcat(*draughts)
 
 
-def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
+def derive_constants(parameters: NamedValues) -> dict[str, SX]:
     """Return the constants of the equations."""
     mass, centre_of_mass, own_inertia = mass_properties(parameters)
-    ballast = Ballast(mass, centre_of_mass, ca.SX(p.WATER_DENSITY))
+    ballast = Ballast(mass, centre_of_mass, SX(p.WATER_DENSITY))
     volume = mass / p.WATER_DENSITY
     equilibrium = _equilibrium(ballast)
     to_level = attitude_at(equilibrium)
@@ -133,37 +134,37 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     }
 
 
-def _equilibrium(ballast: Ballast) -> ca.SX:
+def _equilibrium(ballast: Ballast) -> SX:
     """Return height of O (m), roll and pitch (rad) at rest.
 
     By Newton's method with the constant stiffness of the level hull.
     """
-    state, mass, centre = ca.SX.sym("state", 3), ca.SX.sym("mass"), ca.SX.sym("centre", 3)
+    state, mass, centre = SX.sym("state", 3), SX.sym("mass"), SX.sym("centre", 3)
     given = Ballast(mass, centre, ballast.water_density)
     lever = mass / p.WATER_DENSITY * (p.HULL_CENTRE_OF_BUOYANCY[2] - centre[2])
     stiffness = _WEIGHT_DENSITY * ca.vertcat(p.WATERPLANE_AREA, _MOMENTS + lever)
-    pontoons = resting_pontoons(ca.SX(p.STATION_DRAUGHTS), ca.SX(p.MEAN_DRAUGHT))
+    pontoons = resting_pontoons(SX(p.STATION_DRAUGHTS), SX(p.MEAN_DRAUGHT))
     improve = ca.Function(
         "otter_equilibrium",
         [state, mass, centre],
         [improved_equilibrium(state, pontoons, given, stiffness)],
     )
-    result = ca.SX.zeros(3)
+    result = SX.zeros(3)
     for _ in range(_EQUILIBRIUM_STEPS):
         result = call_in_c(improve, result, ballast.mass, ballast.centre_of_mass)[0]
     return result
 
 
-def _centre_of_buoyancy(equilibrium: ca.SX, draughts: ca.SX, mean_draught: ca.SX) -> ca.SX:
+def _centre_of_buoyancy(equilibrium: SX, draughts: SX, mean_draught: SX) -> SX:
     """Return the centre of the displaced water at rest from O (m, level axes), shape (3,)."""
     pontoons = resting_pontoons(draughts, mean_draught)
     under_water = immersion(
-        pontoons, upward_axis(equilibrium), equilibrium[0], ca.SX.zeros(STRIP_COUNT)
+        pontoons, upward_axis(equilibrium), equilibrium[0], SX.zeros(STRIP_COUNT)
     )
     return attitude_at(equilibrium) @ (under_water.moment / under_water.volume)
 
 
-def frame(to_level: ca.SX, orientation: ca.SX) -> Frame:
+def frame(to_level: SX, orientation: SX) -> Frame:
     """Return the rotations.
 
     Velocities are expressed in axes fixed in the hull that are level when it is at rest.
@@ -181,7 +182,7 @@ def hull(constants: NamedValues) -> Hull:
         inertia=constants["inertia"],
         added_mass=added,
         coriolis_added_mass=added,
-        deck_centre=ca.SX(p.DECK_CENTRE),
+        deck_centre=SX(p.DECK_CENTRE),
         strips=STRIPS,
         loads=lambda now: water_loads(constants, now) + propulsion(constants, now) + wind(now),
         frame=partial(frame, constants["to_level"]),
@@ -189,7 +190,7 @@ def hull(constants: NamedValues) -> Hull:
     )
 
 
-def water_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
+def water_loads(constants: NamedValues, now: LoadArguments) -> SX:
     """Return the load tau (6) of weight and water.
 
     That of the moving water shrinks as the pontoons leave it.
@@ -197,7 +198,7 @@ def water_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
     pontoons = resting_pontoons(constants["station_draughts"], constants["mean_draught"])
     up = now.frame.attitude[2, :].T
     under_water = immersion(pontoons, up, now.height, now.water.elevations)
-    ballast = Ballast(constants["mass"], constants["centre_of_mass"], ca.SX(p.WATER_DENSITY))
+    ballast = Ballast(constants["mass"], constants["centre_of_mass"], SX(p.WATER_DENSITY))
     static = weight_and_buoyancy(under_water, up, ballast)
     to_level = constants["to_level"]
     moving = damping(constants, now) + now.froude_krylov_load(

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import casadi as ca
+from casadi import SX
 
 from cosim.export.fmu.block import Block
 
@@ -37,15 +38,15 @@ from ..vessel.hull import (
 from ..vessel.strips import TwinHull, equivalent_strips
 from ..vessel.vessel_equations import VesselModel, floating_block, wave_table_of
 
-_CENTRE_OF_FLOTATION = ca.SX(p.CENTRE_OF_FLOTATION)
+_CENTRE_OF_FLOTATION = SX(p.CENTRE_OF_FLOTATION)
 _STRIPS = equivalent_strips(
     _CENTRE_OF_FLOTATION,
-    (ca.SX(p.TRANSVERSE_MOMENT), ca.SX(p.MSS_LONGITUDINAL_MOMENT)),
-    ca.SX(p.WATERPLANE_AREA),
+    (SX(p.TRANSVERSE_MOMENT), SX(p.MSS_LONGITUDINAL_MOMENT)),
+    SX(p.WATERPLANE_AREA),
 )
 
 
-def hydrostatics(mass: ca.SX, centre: ca.SX) -> dict[str, ca.SX]:
+def hydrostatics(mass: SX, centre: SX) -> dict[str, SX]:
     """Return the hydrostatics for a mass (kg) and a centre of mass (m, body frame).
 
     Returns:
@@ -55,17 +56,17 @@ def hydrostatics(mass: ca.SX, centre: ca.SX) -> dict[str, ca.SX]:
     """
     volume = mass / p.WATER_DENSITY
     draught = volume / (2 * p.BLOCK_COEFFICIENT * p.PONTOON_BEAM * p.LENGTH)
-    moments = ca.SX([p.TRANSVERSE_MOMENT, p.MSS_LONGITUDINAL_MOMENT])
+    moments = SX([p.TRANSVERSE_MOMENT, p.MSS_LONGITUDINAL_MOMENT])
     buoyancy_height = (5 * draught / 2 - volume / (2 * p.LENGTH * p.PONTOON_BEAM)) / 3
     metacentric_heights = buoyancy_height + moments / volume - (draught + centre[2])
     weight = p.WATER_DENSITY * p.GRAVITY
     stiffness = ca.vertcat(weight * p.WATERPLANE_AREA, weight * volume * metacentric_heights)
-    to_flotation = transformation_matrix(ca.SX(p.CENTRE_OF_FLOTATION))[2:5, 2:5]
+    to_flotation = transformation_matrix(SX(p.CENTRE_OF_FLOTATION))[2:5, 2:5]
     compliance = ca.inv(to_flotation.T @ ca.diag(stiffness) @ to_flotation)
     return {"draught": draught, "stiffness": stiffness, "compliance": compliance}
 
 
-def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
+def derive_constants(parameters: NamedValues) -> dict[str, SX]:
     """Return the constants of the equations."""
     mass, centre, inertia = mass_properties(parameters)
     added = added_mass(inertia)
@@ -74,10 +75,10 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     # pontoons for the mean draught, volume over waterplane
     pontoons = TwinHull(
         _STRIPS,
-        ca.SX(p.PONTOON_BEAM),
+        SX(p.PONTOON_BEAM),
         mass / p.WATER_DENSITY / p.WATERPLANE_AREA,
-        ca.SX(p.PONTOON_TOP - p.PONTOON_BOTTOM),
-        ca.SX(p.WATERPLANE_AREA),
+        SX(p.PONTOON_TOP - p.PONTOON_BOTTOM),
+        SX(p.WATERPLANE_AREA),
     )
     constants = {
         **initial_parameters(parameters),
@@ -98,7 +99,7 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     return constants | {"equilibrium": _equilibrium(constants)}
 
 
-def trim(constants: Mapping[str, ca.SX], attitude: ca.SX) -> ca.SX:
+def trim(constants: Mapping[str, SX], attitude: SX) -> SX:
     """Return height of O (m), roll and pitch (rad) due to the payload, shape (3,).
 
     `attitude` is the rotation matrix body to world frame.
@@ -108,19 +109,19 @@ def trim(constants: Mapping[str, ca.SX], attitude: ca.SX) -> ca.SX:
     return constants["compliance"] @ load[2:5]
 
 
-def _equilibrium(constants: Mapping[str, ca.SX]) -> ca.SX:
+def _equilibrium(constants: Mapping[str, SX]) -> SX:
     """Return the trim at rest by fixed-point iteration.
 
     Each step reduces the error to less than a tenth.
     """
-    equilibrium = ca.SX.zeros(3)
+    equilibrium = SX.zeros(3)
     for _ in range(20):
-        orientation = kinematics.quaternion_from_euler(equilibrium[1], equilibrium[2], ca.SX(0))
+        orientation = kinematics.quaternion_from_euler(equilibrium[1], equilibrium[2], SX(0))
         equilibrium = trim(constants, kinematics.rotation_matrix(orientation))
     return equilibrium
 
 
-def frame(constants: NamedValues, orientation: ca.SX) -> Frame:
+def frame(constants: NamedValues, orientation: SX) -> Frame:
     """Return the rotations.
 
     As in MSS, velocities are expressed in the frame with the Euler angles of the hull minus the
@@ -147,7 +148,7 @@ def hull(constants: NamedValues) -> Hull:
         inertia=constants["inertia"],
         added_mass=added,
         coriolis_added_mass=added,
-        deck_centre=ca.SX(p.DECK_CENTRE),
+        deck_centre=SX(p.DECK_CENTRE),
         strips=_STRIPS,
         loads=lambda now: (
             propulsion(constants, now)
@@ -160,7 +161,7 @@ def hull(constants: NamedValues) -> Hull:
     )
 
 
-def restoring(constants: NamedValues, now: LoadArguments) -> ca.SX:
+def restoring(constants: NamedValues, now: LoadArguments) -> SX:
     """Return the restoring load tau.
 
     It is linear in heave, roll and pitch relative to the trim and to the water surface.

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import casadi as ca
 import numpy as np
+from casadi import SX
 
 from cosim.export.equations.fmu_code import as_block
 from cosim.export.equations.model import ContinuousModel
@@ -64,7 +65,7 @@ def planar_vessel_model(
     )
 
 
-def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
+def derive_constants(parameters: NamedValues) -> dict[str, SX]:
     """Return the constants of the equations."""
     x, y, _ = ca.vertsplit(parameters["centre_of_mass"])
     mass = parameters["mass"]
@@ -79,7 +80,7 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     }
 
 
-def rate(state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
+def rate(state: SX, inputs: NamedValues, constants: NamedValues) -> SX:
     """Return the time derivative of the state."""
     yaw, u, v, r = ca.vertsplit(state[2:_BODY_STATES])
     sin, cos = sine_and_cosine(yaw)
@@ -108,7 +109,7 @@ def rate(state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
     )
 
 
-def coriolis(mass: ca.SX, nu: ca.SX) -> ca.SX:
+def coriolis(mass: SX, nu: SX) -> SX:
     """Return C(nu) nu of a mass matrix (3, 3) (Fossen 2021, section 3.3, in three velocities)."""
     momentum = mass @ nu
     return ca.vertcat(
@@ -116,9 +117,7 @@ def coriolis(mass: ca.SX, nu: ca.SX) -> ca.SX:
     )
 
 
-def water_loads(
-    actuators: ca.SX, relative: ca.SX, inputs: NamedValues, constants: NamedValues
-) -> ca.SX:
+def water_loads(actuators: SX, relative: SX, inputs: NamedValues, constants: NamedValues) -> SX:
     """Return the load (X, Y, N) about O of water, propellers and rudders."""
     load = square_matrix(constants["linear_damping"]) @ relative
     for k, letter in enumerate("uvr"):
@@ -128,25 +127,25 @@ def water_loads(
     speed = propulsion.speeds(actuators, inputs, constants)
     flow = ca.vertcat(relative[0:2], 0, 0, 0, relative[2])
     driving = propulsion.propeller_loads(
-        speed, flow, ca.SX(_FAR_BELOW), ca.SX.zeros(3), inputs, constants
+        speed, flow, SX(_FAR_BELOW), SX.zeros(3), inputs, constants
     )
     driving += propulsion.rudder_loads(speed, flow, inputs, constants)
     return ca.vertcat(driving[0:2], driving[5]) - load
 
 
-def _load_at(point: ca.SX, force: ca.SX) -> ca.SX:
+def _load_at(point: SX, force: SX) -> SX:
     return ca.vertcat(force, point[0] * force[1] - point[1] * force[0])
 
 
-def initial_state(constants: NamedValues, slots: int) -> ca.SX:
+def initial_state(constants: NamedValues, slots: int) -> SX:
     """Return the state at the start; the propellers rest."""
     initial = ca.vertcat(
         constants["initial.position"], constants["initial.yaw"], constants["initial.velocity_body"]
     )
-    return ca.vertcat(initial, constants["initial.rates"], ca.SX.zeros(slots))
+    return ca.vertcat(initial, constants["initial.rates"], SX.zeros(slots))
 
 
-def observe(state: ca.SX, constants: NamedValues) -> ca.SX:
+def observe(state: SX, constants: NamedValues) -> SX:
     """Return the motion outputs of the vessel and of its landing deck."""
     centre = constants["centre_of_mass"]
     height, deck = constants["height"] + centre[2], constants["deck_centre"] - centre
@@ -167,7 +166,7 @@ def planar_vessel_block(
     model = model.with_called_derivatives()
     by_name = ConstantsMap(model.variables, derive_constants).by_name
 
-    def body(constants: ca.SX) -> planar_maps.PlanarBody:
+    def body(constants: SX) -> planar_maps.PlanarBody:
         known = by_name(constants)
         return planar_maps.PlanarBody(
             known["mass"], known["yaw_inertia"], known["height"] + known["centre_of_mass"][2]

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 
 import casadi as ca
+from casadi import SX
 
 from cosim.export.equations.fmu_code import as_block
 from cosim.export.equations.model import ContinuousModel
@@ -28,14 +29,14 @@ from . import parameters as p
 from .interface import INPUTS, VARIABLES
 
 
-def resistance(u: ca.SX) -> ca.SX:
+def resistance(u: SX) -> SX:
     """Return the surge force (N) of both hulls for a surge velocity relative to the water (m/s)."""
     square = u * u
     coefficient = friction_coefficient(u) + residuary_coefficient(square)
     return -p.WATER_DENSITY / 2 * p.WETTED_SURFACE * coefficient * ca.fabs(u) * u
 
 
-def friction_coefficient(u: ca.SX) -> ca.SX:
+def friction_coefficient(u: SX) -> SX:
     """Return 0.075 / (log10 Re - 2)^2 for a speed (m/s), the ITTC-57 line.
 
     Slower flow has the value at `MIN_REYNOLDS_NUMBER`.
@@ -45,7 +46,7 @@ def friction_coefficient(u: ca.SX) -> ca.SX:
     return 0.075 / (exponent * exponent)
 
 
-def residuary_coefficient(square: ca.SX) -> ca.SX:
+def residuary_coefficient(square: SX) -> SX:
     """Return the residuary coefficient for a squared speed (m2/s2).
 
     It rises with Fn^2 to its maximum and falls with Fn^-2.
@@ -54,7 +55,7 @@ def residuary_coefficient(square: ca.SX) -> ca.SX:
     return p.RESIDUARY_PEAK * 2 * share / (1 + share * share)
 
 
-def rate(state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
+def rate(state: SX, inputs: NamedValues, constants: NamedValues) -> SX:
     """Return the time derivative of the state (x, y, yaw, surge u, sway v, yaw rate r)."""
     yaw, u, v, r = ca.vertsplit(state[2:6])
     external_force, wind, current = inputs["external_force"], inputs["wind"], inputs["current"]
@@ -77,17 +78,17 @@ def rate(state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
     return ca.vertcat(*kinematic, *dynamic)
 
 
-def hull_loads(v: ca.SX, r: ca.SX) -> ca.SX:
+def hull_loads(v: SX, r: SX) -> SX:
     """Return (X, Y, N) of the hulls for sway velocity and yaw rate relative to the water."""
     return p.HULL_COUNT * ca.vertcat(0, p.Y_V * v + p.Y_R * r, p.N_V * v + p.N_R * r)
 
 
-def air_drag(u: ca.SX, v: ca.SX) -> ca.SX:
+def air_drag(u: SX, v: SX) -> SX:
     """Return (X, Y, N) of the air for a surge and sway velocity (m/s) relative to the air."""
     return -p.AIR_DRAG * ca.vertcat(ca.fabs(u) * u, ca.fabs(v) * v, 0)
 
 
-def hull_constants(parameters: NamedValues) -> dict[str, ca.SX]:
+def hull_constants(parameters: NamedValues) -> dict[str, SX]:
     """Return the constants of resistance and propeller race.
 
     The race factor is 2 / (rho A) (m2/s2/N), 0 for a propeller with the diameter 0.
@@ -98,7 +99,7 @@ def hull_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     return {"resistance": parameters["resistance"], "race_factor": factor}
 
 
-def race_velocity_squared(thrust: ca.SX, factor: ca.SX) -> ca.SX:
+def race_velocity_squared(thrust: SX, factor: SX) -> SX:
     """Return what the propeller adds to the squared velocity at the rudder (m2/s2).
 
     In its fully developed race, the momentum theory of the actuator disc gives u_race^2 = u^2 +
@@ -111,7 +112,7 @@ def race_velocity_squared(thrust: ca.SX, factor: ca.SX) -> ca.SX:
     return factor * ca.fmax(thrust, 0)
 
 
-def rudder_loads(u: ca.SX, v: ca.SX, r: ca.SX, race: ca.SX, rudder_angle: ca.SX) -> ca.SX:
+def rudder_loads(u: SX, v: SX, r: SX, race: SX, rudder_angle: SX) -> SX:
     """Return (X, Y, N) of the rudder.
 
     The lift is a sine of the angle of attack up to the stall angle.
@@ -124,16 +125,16 @@ def rudder_loads(u: ca.SX, v: ca.SX, r: ca.SX, race: ca.SX, rudder_angle: ca.SX)
         rudder_angle: Rudder angle (rad).
     """
     turn = ca.sin(rudder_angle), ca.cos(rudder_angle)
-    pressure_area = ca.SX(p.WATER_DENSITY / 2 * p.RUDDER_MAX_LIFT_COEFFICIENT * p.RUDDER_AREA)
+    pressure_area = SX(p.WATER_DENSITY / 2 * p.RUDDER_MAX_LIFT_COEFFICIENT * p.RUDDER_AREA)
     ahead, abeam = rudder_force(
-        u, v - p.RUDDER_ARM * r, race, rudder_angle, turn, pressure_area, ca.SX(p.STALL_ANGLE)
+        u, v - p.RUDDER_ARM * r, race, rudder_angle, turn, pressure_area, SX(p.STALL_ANGLE)
     )
     return ca.vertcat(ahead, abeam, -p.RUDDER_ARM * abeam)
 
 
-def observe(state: ca.SX) -> ca.SX:
+def observe(state: SX) -> SX:
     """Return the motion outputs of the vessel and of its landing deck."""
-    return planar_maps.planar_outputs(state, ca.SX(p.CENTRE_OF_MASS_HEIGHT), ca.SX(p.DECK_CENTRE))
+    return planar_maps.planar_outputs(state, SX(p.CENTRE_OF_MASS_HEIGHT), SX(p.DECK_CENTRE))
 
 
 #: map from the parameters to the constants of the equations
@@ -162,9 +163,7 @@ def model() -> ContinuousModel:
 def block() -> Block:
     """Return the catamaran for export."""
     equations = model()
-    body = planar_maps.PlanarBody(
-        ca.SX(p.MASS), ca.SX(p.INERTIA[2]), ca.SX(p.CENTRE_OF_MASS_HEIGHT)
-    )
+    body = planar_maps.PlanarBody(SX(p.MASS), SX(p.INERTIA[2]), SX(p.CENTRE_OF_MASS_HEIGHT))
     maps = planar_maps.PlanarContactMaps(
         equations, lambda _constants: body, lambda state, _constants: observe(state)
     )

@@ -36,6 +36,7 @@ from itertools import product
 
 import casadi as ca
 import numpy as np
+from casadi import SX
 
 from cosim.core.component import Variable
 from cosim.export.equations.c_code import call_in_c
@@ -70,7 +71,7 @@ from .craft import MAX_THRUSTERS, OCTANTS, Craft, Thruster, states, variables
 _SMALLEST_EXTENT = 1e-3  # m, replaces the vertical extent of a box without size
 
 
-def restoring_load(up: ca.SX, depth: ca.SX, constants: NamedValues) -> ca.SX:
+def restoring_load(up: SX, depth: SX, constants: NamedValues) -> SX:
     """Return weight and buoyancy: force (N) and torque about the centre of mass (N m), body frame.
 
     Args:
@@ -85,7 +86,7 @@ def restoring_load(up: ca.SX, depth: ca.SX, constants: NamedValues) -> ca.SX:
     return ca.vertcat((buoyancy * ca.sum1(fractions) - weight) * up, torque)
 
 
-def immersed_fraction(up: ca.SX, depth: ca.SX, constants: NamedValues) -> ca.SX:
+def immersed_fraction(up: SX, depth: SX, constants: NamedValues) -> SX:
     """Return the immersed fraction of the displaced volume.
 
     The arguments are those of `restoring_load`.
@@ -93,20 +94,20 @@ def immersed_fraction(up: ca.SX, depth: ca.SX, constants: NamedValues) -> ca.SX:
     return ca.sum1(_octant_fractions(up, depth, constants))
 
 
-def _octant_fractions(up: ca.SX, depth: ca.SX, constants: NamedValues) -> ca.SX:
+def _octant_fractions(up: SX, depth: SX, constants: NamedValues) -> SX:
     """Return the immersed part of each octant over the whole displaced volume."""
     extent = ca.fmax(ca.dot(ca.fabs(up), constants["hull_size"]) / 2, _SMALLEST_EXTENT)
     return clamp((depth - constants["octants"].T @ up) / extent + 0.5) / OCTANTS
 
 
-def mass_matrix(constants: NamedValues, immersed: ca.SX) -> ca.SX:
+def mass_matrix(constants: NamedValues, immersed: SX) -> SX:
     """Return the mass matrix (6, 6) about the centre of mass with the immersed added mass."""
     body = rigid_body(constants)
-    rigid = ca.diagcat(body.mass * ca.SX.eye(3), body.inertia)
+    rigid = ca.diagcat(body.mass * SX.eye(3), body.inertia)
     return rigid + immersed * square_matrix(constants["added_mass"])
 
 
-def solve_symmetric(matrix: ca.SX, right: ca.SX) -> ca.SX:
+def solve_symmetric(matrix: SX, right: SX) -> SX:
     """Return the solution of a linear system with a symmetric positive definite matrix.
 
     By its decomposition into L D L^T with a unit lower triangular matrix L and a diagonal one D,
@@ -114,7 +115,7 @@ def solve_symmetric(matrix: ca.SX, right: ca.SX) -> ca.SX:
     edition, section 4.1.2).
     """
     size = matrix.rows()
-    lower, diagonal, solution = ca.SX.eye(size), ca.SX.zeros(size), ca.SX(right)
+    lower, diagonal, solution = SX.eye(size), SX.zeros(size), SX(right)
     for j in range(size):
         row = lower[j, :j].T
         diagonal[j] = matrix[j, j] - ca.dot(row * row, diagonal[:j])
@@ -151,7 +152,7 @@ class SubmergedEquations:
         """Map from the parameters to the constants of the equations."""
         return ConstantsMap(self.variables, self.derive_constants)
 
-    def derive_constants(self, parameters: NamedValues) -> dict[str, ca.SX]:
+    def derive_constants(self, parameters: NamedValues) -> dict[str, SX]:
         """Return the constants of the equations.
 
         The parameters, the inverse of the inertia tensor, the centres of the octants and the loads
@@ -172,16 +173,16 @@ class SubmergedEquations:
             "unit_loads": ca.horzcat(*loads),
         }
 
-    def _inputs(self, vector: ca.SX) -> NamedValues:
+    def _inputs(self, vector: SX) -> NamedValues:
         return values_by_name(vector, variables_of(self.variables, "input"))
 
-    def initial_state(self, constants: ca.SX) -> ca.SX:
+    def initial_state(self, constants: SX) -> SX:
         """Return the state at the start; the thrusters rest."""
         return ca.vertcat(
-            initial_rigid_state(self.constants.by_name(constants)), ca.SX.zeros(self.slots)
+            initial_rigid_state(self.constants.by_name(constants)), SX.zeros(self.slots)
         )
 
-    def rate(self, state: ca.SX, inputs: ca.SX, constants: ca.SX) -> ca.SX:
+    def rate(self, state: SX, inputs: SX, constants: SX) -> SX:
         """Return the time derivative of the state of a vehicle whose thrusters lag."""
         speed, known = state[RIGID_BODY_STATE_COUNT:], self.constants.by_name(constants)
         lag = known["thruster_time_constant"]
@@ -192,12 +193,12 @@ class SubmergedEquations:
             self.body_rate(state[:RIGID_BODY_STATE_COUNT], speed, inputs, constants), speed_rate
         )
 
-    def _commanded_speeds(self, inputs: NamedValues, constants: NamedValues) -> ca.SX:
+    def _commanded_speeds(self, inputs: NamedValues, constants: NamedValues) -> SX:
         """Return the commanded thruster speeds (rad/s) within their limits."""
         limit = constants["max_thruster_speed"]
         return ca.fmin(ca.fmax(inputs["thruster_speed"], -limit), limit)
 
-    def body_rate(self, state: ca.SX, speed: ca.SX, inputs: ca.SX, constants: ca.SX) -> ca.SX:
+    def body_rate(self, state: SX, speed: SX, inputs: SX, constants: SX) -> SX:
         """Return the time derivative of the states of the rigid body.
 
         Args:
@@ -214,7 +215,7 @@ class SubmergedEquations:
         load, immersed = restoring_load(up, depth, known), immersed_fraction(up, depth, known)
         added = immersed * square_matrix(known["added_mass"])
         momentum = added @ relative
-        load += added @ ca.vertcat(ca.cross(rates, flow), ca.SX.zeros(3))
+        load += added @ ca.vertcat(ca.cross(rates, flow), SX.zeros(3))
         load -= ca.vertcat(
             ca.cross(rates, momentum[0:3]),
             ca.cross(flow, momentum[0:3]) + ca.cross(rates, momentum[3:6]),
@@ -236,13 +237,13 @@ class SubmergedEquations:
 
     def _thruster_load(
         self,
-        up: ca.SX,
-        height: ca.SX,
-        speed: ca.SX,
-        relative: ca.SX,
+        up: SX,
+        height: SX,
+        speed: SX,
+        relative: SX,
         inputs: NamedValues,
         constants: NamedValues,
-    ) -> ca.SX:
+    ) -> SX:
         """Return force and torque (6) of all thrusters."""
         hubs = vector_rows(constants, "thruster_position")
         below = inputs["water_level"] - height - hubs @ up.T
@@ -257,7 +258,7 @@ class SubmergedEquations:
         )
         load = constants["unit_loads"] @ (ca.if_else(speed > 0, forward, reverse) * squared - loss)
         reaction = constants["unit_loads"][0:3, :] @ (constants["torque_coefficient"] * squared)
-        return load + ca.vertcat(ca.SX.zeros(3), reaction)
+        return load + ca.vertcat(SX.zeros(3), reaction)
 
     @cached_property
     def step_function(self) -> ca.Function:
@@ -272,11 +273,11 @@ class SubmergedEquations:
             "inputs": inputs,
             "constants": constants,
         }
-        body, speed, given, known = (ca.SX.sym(name, size) for name, size in sizes.items())
+        body, speed, given, known = (SX.sym(name, size) for name, size in sizes.items())
         rate = ca.Function(
             "body_rate", [body, speed, given, known], [self.body_rate(body, speed, given, known)]
         )
-        state, step = ca.SX.sym("state", RIGID_BODY_STATE_COUNT + self.slots), ca.SX.sym("step")
+        state, step = SX.sym("state", RIGID_BODY_STATE_COUNT + self.slots), SX.sym("step")
         names = self.constants.by_name(known)
         target = self._commanded_speeds(self._inputs(given), names)
         start, middle, end = lagging_speeds(
@@ -319,7 +320,7 @@ def submerged_block(craft: Craft, description: str, thruster_slots: int | None =
     )
     by_name = equations.constants.by_name
 
-    def velocity_change(up: ca.SX, depth: ca.SX, constants: ca.SX, impulse: ca.SX) -> ca.SX:
+    def velocity_change(up: SX, depth: SX, constants: SX, impulse: SX) -> SX:
         known = by_name(constants)
         return solve_symmetric(mass_matrix(known, immersed_fraction(up, depth, known)), impulse)
 

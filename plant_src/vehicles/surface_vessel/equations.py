@@ -10,6 +10,7 @@ from itertools import product
 
 import casadi as ca
 import numpy as np
+from casadi import SX
 
 from cosim.export.equations.c_code import call_in_c
 from cosim.export.fmu.block import Block
@@ -90,7 +91,7 @@ def surface_vessel_model(
     )
 
 
-def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
+def derive_constants(parameters: NamedValues) -> dict[str, SX]:
     """Return the constants of the equations."""
     inertia = symmetric_matrix(parameters["inertia"])
     mass_matrix = rigid_body_mass_matrix(parameters["mass"], parameters["centre_of_mass"], inertia)
@@ -116,12 +117,12 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     return constants | {"equilibrium": _equilibrium(named), "wave_table": table}
 
 
-def draught(parameters: NamedValues) -> ca.SX:
+def draught(parameters: NamedValues) -> SX:
     """Return the mean draught (m)."""
     return parameters["mass"] / parameters["water_density"] / parameters["waterplane_area"]
 
 
-def _waterplane_centre(parameters: NamedValues) -> ca.SX:
+def _waterplane_centre(parameters: NamedValues) -> SX:
     return ca.vertcat(
         parameters["waterplane_centre"], 0, parameters["hull_bottom"] + draught(parameters)
     )
@@ -142,13 +143,13 @@ def twin_hull(constants: NamedValues) -> TwinHull:
     )
 
 
-def _equilibrium(constants: NamedValues) -> ca.SX:
+def _equilibrium(constants: NamedValues) -> SX:
     """Return height of O (m), roll and pitch (rad) at rest.
 
     By Newton's method with the constant stiffness of the upright hull.
     """
-    symbols = NamedValues({name: ca.SX.sym(name) for name in _HYDROSTATICS})
-    state = ca.SX.sym("state", 3)
+    symbols = NamedValues({name: SX.sym(name) for name in _HYDROSTATICS})
+    state = SX.sym("state", 3)
     improve = ca.Function(
         "equilibrium", [state, symbols.vector()], [_improved_equilibrium(state, symbols)]
     )
@@ -159,7 +160,7 @@ def _equilibrium(constants: NamedValues) -> ca.SX:
     return result
 
 
-def _improved_equilibrium(state: ca.SX, constants: NamedValues) -> ca.SX:
+def _improved_equilibrium(state: SX, constants: NamedValues) -> SX:
     """Return height of O (m), roll and pitch (rad) after one step towards the equilibrium."""
     form, weight_density = twin_hull(constants), GRAVITY * constants["water_density"]
     area, volume = constants["waterplane_area"], constants["mass"] / constants["water_density"]
@@ -188,7 +189,7 @@ def hull(constants: NamedValues) -> Hull:
     )
 
 
-def water_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
+def water_loads(constants: NamedValues, now: LoadArguments) -> SX:
     """Return the load tau (6) of weight, water and propellers.
 
     That of the moving water shrinks as the hulls leave it.
@@ -213,7 +214,7 @@ def water_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
     return static + under_water.wetness * moving + thrust
 
 
-def damping(constants: NamedValues, flow: ca.SX) -> ca.SX:
+def damping(constants: NamedValues, flow: SX) -> SX:
     """Return tau of the damping for the velocity relative to the water, shape (6,).
 
     -D nu_r - D_q (|nu_r| nu_r), products by elements (Fossen 2021, section 6.4).
@@ -223,7 +224,7 @@ def damping(constants: NamedValues, flow: ca.SX) -> ca.SX:
     return -(linear @ flow + quadratic @ (ca.fabs(flow) * flow))
 
 
-def vertical_drag(constants: NamedValues, flow: ca.SX) -> ca.SX:
+def vertical_drag(constants: NamedValues, flow: SX) -> SX:
     """Return tau of the drag of the bottoms.
 
     It acts at four points around the centre of the waterplane, whose mean squared distances are
@@ -231,7 +232,7 @@ def vertical_drag(constants: NamedValues, flow: ca.SX) -> ca.SX:
     """
     pressure = constants["water_density"] / 8 * constants["vertical_drag_coefficient"]
     coefficient = pressure * constants["waterplane_area"]
-    load = ca.SX.zeros(6)
+    load = SX.zeros(6)
     for ahead, side in product((-1, 1), repeat=2):
         x = constants["waterplane_centre"] + ahead * constants["drag_point.x"]
         y = side * constants["drag_point.y"]
@@ -241,7 +242,7 @@ def vertical_drag(constants: NamedValues, flow: ca.SX) -> ca.SX:
     return load
 
 
-def cross_flow_drag(constants: NamedValues, flow: ca.SX) -> ca.SX:
+def cross_flow_drag(constants: NamedValues, flow: SX) -> SX:
     """Return tau of the cross-flow drag along the hull, at half of the draught.
 
     Each station is a section in transverse flow, whose velocity grows with the yaw rate (Fossen
@@ -252,7 +253,7 @@ def cross_flow_drag(constants: NamedValues, flow: ca.SX) -> ca.SX:
     coefficient = (
         constants["water_density"] / 2 * depth * constants["cross_flow_drag_coefficient"] * spacing
     )
-    force, moment = ca.SX(0), ca.SX(0)
+    force, moment = SX(0), SX(0)
     for share in np.linspace(-0.5, 0.5, DRAG_STATIONS).tolist():
         x = constants["waterplane_centre"] + share * length
         across = flow[1] + x * flow[5]
@@ -262,7 +263,7 @@ def cross_flow_drag(constants: NamedValues, flow: ca.SX) -> ca.SX:
     return ca.vertcat(0, force, 0, -height * force, 0, moment)
 
 
-def wind_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
+def wind_loads(constants: NamedValues, now: LoadArguments) -> SX:
     """Return tau of the air."""
     air = now.air_relative_velocity[0:2]
     force = ca.vertcat(-constants["air_drag"] * ca.fabs(air) * air, 0)
@@ -281,7 +282,7 @@ def surface_vessel_block(
     """
     equations = surface_vessel_model(vessel, description, slots or vessel.slots)
 
-    def body(constants: ca.SX) -> BulletBody:
+    def body(constants: SX) -> BulletBody:
         known = equations.constants.by_name(constants)
         return BulletBody(known["mass"], ca.diag(known["inertia_tensor"]))
 

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
+from casadi import SX
 
 from ..common import kinematics
 from ..common.interface import VESSEL_STATES
@@ -51,12 +52,12 @@ class Frame:
             frame, shape (3, 3).
     """
 
-    attitude: ca.SX
-    to_world: ca.SX
-    rates_to_angular_velocity: ca.SX
-    world_to_current_axes: ca.SX
+    attitude: SX
+    to_world: SX
+    rates_to_angular_velocity: SX
+    world_to_current_axes: SX
 
-    def generalised_force(self, force: ca.SX, torque: ca.SX) -> ca.SX:
+    def generalised_force(self, force: SX, torque: SX) -> SX:
         """Return the load tau (6) of a force at O (N) and a torque about O (N m), world frame."""
         return ca.vertcat(
             self.to_world.T @ force, self.rates_to_angular_velocity.T @ (self.attitude.T @ torque)
@@ -80,21 +81,21 @@ class LoadArguments:
     """
 
     frame: Frame
-    orientation: ca.SX
-    relative_velocity: ca.SX
-    air_relative_velocity: ca.SX
-    velocity: ca.SX
-    height: ca.SX
+    orientation: SX
+    relative_velocity: SX
+    air_relative_velocity: SX
+    velocity: SX
+    height: SX
     water: WaterMotion
     inputs: NamedValues
-    actuators: ca.SX
+    actuators: SX
 
     @property
-    def rates_in_water(self) -> ca.SX:
+    def rates_in_water(self) -> SX:
         """Roll and pitch rate relative to the surface of the water (rad/s), shape (2,)."""
         return self.relative_velocity[3:5] - self.water.rates
 
-    def froude_krylov_load(self, mass: ca.SX, centre: ca.SX, strips: Strips) -> ca.SX:
+    def froude_krylov_load(self, mass: SX, centre: SX, strips: Strips) -> SX:
         """Return tau that accelerates the displaced water with the waves.
 
         It is the Froude-Krylov load beyond the hydrostatic pressure (Faltinsen 1990, Sea Loads on
@@ -111,10 +112,10 @@ class LoadArguments:
         )
 
 
-def level_frame(orientation: ca.SX) -> Frame:
+def level_frame(orientation: SX) -> Frame:
     """Return the frame of a hull whose velocity frame is the body frame."""
     attitude = kinematics.rotation_matrix(orientation)
-    return Frame(attitude, attitude, ca.SX.eye(3), attitude.T)
+    return Frame(attitude, attitude, SX.eye(3), attitude.T)
 
 
 @dataclass(frozen=True)
@@ -142,28 +143,28 @@ class Hull:
             `centre_of_mass`. The inertia is in the velocity frame as well.
     """
 
-    mass: ca.SX
-    centre_of_mass: ca.SX
-    inertia: ca.SX
-    added_mass: ca.SX
-    coriolis_added_mass: ca.SX
-    inverse_mass_matrix: ca.SX
-    deck_centre: ca.SX
-    equilibrium: ca.SX
+    mass: SX
+    centre_of_mass: SX
+    inertia: SX
+    added_mass: SX
+    coriolis_added_mass: SX
+    inverse_mass_matrix: SX
+    deck_centre: SX
+    equilibrium: SX
     strips: Strips
-    wave_count: ca.SX
-    wave_table: ca.SX
-    loads: Callable[[LoadArguments], ca.SX]
-    frame: Callable[[ca.SX], Frame] = level_frame
-    centre_in_velocity_axes: ca.SX | None = None
+    wave_count: SX
+    wave_table: SX
+    loads: Callable[[LoadArguments], SX]
+    frame: Callable[[SX], Frame] = level_frame
+    centre_in_velocity_axes: SX | None = None
 
     @property
-    def velocity_centre(self) -> ca.SX:
+    def velocity_centre(self) -> SX:
         """Centre of mass in the velocity frame (m), shape (3,)."""
         other = self.centre_in_velocity_axes
         return self.centre_of_mass if other is None else other
 
-    def initial_state(self, initial: NamedValues, actuators: int = 0) -> ca.SX:
+    def initial_state(self, initial: NamedValues, actuators: int = 0) -> SX:
         """Return the state from the parameters `initial.*`, with `actuators` further states of 0.
 
         With `initial.on_waves` the vessel is displaced with the plane of the surface, and moves
@@ -200,11 +201,9 @@ class Hull:
             + frame.to_world.T @ water.velocity
             - ca.cross(rates, self.velocity_centre)
         )
-        return ca.vertcat(
-            origin, height, orientation, velocity, rates, time, ca.SX.zeros(actuators)
-        )
+        return ca.vertcat(origin, height, orientation, velocity, rates, time, SX.zeros(actuators))
 
-    def rate(self, state: ca.SX, inputs: NamedValues) -> ca.SX:
+    def rate(self, state: SX, inputs: NamedValues) -> SX:
         """Return the time derivative of position, quaternion, nu and time.
 
         In the current and the waves (Fossen 2021, chapter 10; `vehicles/README.md`).
@@ -247,14 +246,14 @@ class Hull:
             self.coriolis_added_mass, nu_r
         )
         acceleration = self.inverse_mass_matrix @ tau - ca.vertcat(
-            ca.cross(rates, current), ca.SX.zeros(3)
+            ca.cross(rates, current), SX.zeros(3)
         )
         quaternion_rate = kinematics.quaternion_rate(
             orientation, frame.rates_to_angular_velocity @ rates
         )
         return ca.vertcat(frame.to_world @ nu[0:3], quaternion_rate, acceleration, 1)
 
-    def _rigid_body_coriolis(self, nu: ca.SX) -> ca.SX:
+    def _rigid_body_coriolis(self, nu: SX) -> SX:
         """Return C_RB(nu) nu in terms of the angular velocity (Fossen 2021, section 3.3)."""
         velocity, rates = nu[0:3], nu[3:6]
         force = self.mass * ca.cross(rates, velocity + ca.cross(rates, self.velocity_centre))
@@ -262,12 +261,12 @@ class Hull:
             force, ca.cross(rates, self.inertia @ rates) + ca.cross(self.velocity_centre, force)
         )
 
-    def load_at_centre(self, frame: Frame, load: ca.SX) -> ca.SX:
+    def load_at_centre(self, frame: Frame, load: SX) -> SX:
         """Return the load tau of a force at the centre of mass and a torque (6, world frame)."""
         lever = frame.attitude @ self.centre_of_mass
         return frame.generalised_force(load[0:3], load[3:6] + ca.cross(lever, load[0:3]))
 
-    def observe(self, state: ca.SX) -> ca.SX:
+    def observe(self, state: SX) -> SX:
         """Return the motion of the centre of mass and of the deck.
 
         They are `interface.MOTION_OUTPUTS` and `interface.DECK_OUTPUTS`.
@@ -308,24 +307,24 @@ def hull_of(constants: NamedValues, **others: Any) -> Hull:
     )
 
 
-def coriolis_load(mass: ca.SX, nu: ca.SX) -> ca.SX:
+def coriolis_load(mass: SX, nu: SX) -> SX:
     """Return C(nu) nu of a mass matrix (6, 6), for added mass Fossen (2021), eq. 6.48."""
     momentum = mass @ nu
     force = ca.cross(nu[3:6], momentum[0:3])
     return ca.vertcat(force, ca.cross(nu[0:3], momentum[0:3]) + ca.cross(nu[3:6], momentum[3:6]))
 
 
-def load_of_force_at(point: ca.SX, force: ca.SX) -> ca.SX:
+def load_of_force_at(point: SX, force: SX) -> SX:
     """Return the load tau of a force (N) at a point (m), both in the body frame."""
     return ca.vertcat(force, ca.cross(point, force))
 
 
-def transformation_matrix(point: ca.SX) -> ca.SX:
+def transformation_matrix(point: SX) -> SX:
     """Return the matrix (6, 6) from nu of O to nu of a point (m) (Fossen 2021, appendix C)."""
-    return ca.blockcat([[ca.SX.eye(3), -ca.skew(point)], [ca.SX.zeros(3, 3), ca.SX.eye(3)]])
+    return ca.blockcat([[SX.eye(3), -ca.skew(point)], [SX.zeros(3, 3), SX.eye(3)]])
 
 
-def rigid_body_mass_matrix(mass: ca.SX, centre: ca.SX, inertia: ca.SX) -> ca.SX:
+def rigid_body_mass_matrix(mass: SX, centre: SX, inertia: SX) -> SX:
     """Return M_RB about O (Fossen 2021, eq. 3.60).
 
     Args:
@@ -334,7 +333,7 @@ def rigid_body_mass_matrix(mass: ca.SX, centre: ca.SX, inertia: ca.SX) -> ca.SX:
         inertia: Inertia about the centre of mass I_g (kg m2), shape (3, 3).
     """
     to_centre = transformation_matrix(centre)
-    return to_centre.T @ ca.diagcat(mass * ca.SX.eye(3), inertia) @ to_centre
+    return to_centre.T @ ca.diagcat(mass * SX.eye(3), inertia) @ to_centre
 
 
 @dataclass(frozen=True)
@@ -347,19 +346,19 @@ class Ballast:
         water_density: Density of the water (kg/m3).
     """
 
-    mass: ca.SX
-    centre_of_mass: ca.SX
-    water_density: ca.SX
+    mass: SX
+    centre_of_mass: SX
+    water_density: SX
 
 
-def weight_and_buoyancy(under_water: Immersion, up: ca.SX, ballast: Ballast) -> ca.SX:
+def weight_and_buoyancy(under_water: Immersion, up: SX, ballast: Ballast) -> SX:
     """Return the load tau (6) of weight and buoyancy for the vertical axis in the body frame."""
     weight = load_of_force_at(ballast.centre_of_mass, -GRAVITY * ballast.mass * up)
     density = GRAVITY * ballast.water_density
     return weight + density * ca.vertcat(under_water.volume * up, ca.cross(under_water.moment, up))
 
 
-def improved_equilibrium(state: ca.SX, hull: TwinHull, ballast: Ballast, stiffness: ca.SX) -> ca.SX:
+def improved_equilibrium(state: SX, hull: TwinHull, ballast: Ballast, stiffness: SX) -> SX:
     """Return the state after one step of Newton's method towards the equilibrium in still water.
 
     The state is height of O (m), roll and pitch (rad). The stiffness is that of the upright hull in
@@ -374,18 +373,18 @@ def improved_equilibrium(state: ca.SX, hull: TwinHull, ballast: Ballast, stiffne
     """
     middle = hull.strips.centre
     up = upward_axis(state)
-    load = weight_and_buoyancy(immersion(hull, up, state[0], ca.SX.zeros(STRIP_COUNT)), up, ballast)
+    load = weight_and_buoyancy(immersion(hull, up, state[0], SX.zeros(STRIP_COUNT)), up, ballast)
     force, moment = ca.dot(load[0:3], up), load[3:6] - ca.cross(middle, load[0:3])
     angles = moment[0:2] / stiffness[1:3]
     return state + ca.vertcat(force / stiffness[0] + middle[0] * angles[1], angles)
 
 
-def attitude_at(state: ca.SX) -> ca.SX:
+def attitude_at(state: SX) -> SX:
     """Return the rotation matrix body to world frame for height, roll and pitch without yaw."""
-    orientation = kinematics.quaternion_from_euler(state[1], state[2], ca.SX(0))
+    orientation = kinematics.quaternion_from_euler(state[1], state[2], SX(0))
     return kinematics.rotation_matrix(orientation)
 
 
-def upward_axis(state: ca.SX) -> ca.SX:
+def upward_axis(state: SX) -> SX:
     """Return the vertical axis of the world in the body frame for a state, shape (3,)."""
     return attitude_at(state)[2, :].T

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import casadi as ca
+from casadi import SX
 
 from cosim.export.equations.model import ContinuousModel
 
@@ -29,9 +30,9 @@ class PlanarBody(NamedTuple):
     Both belong to the centre of mass.
     """
 
-    mass: ca.SX
-    yaw_inertia: ca.SX
-    height: ca.SX
+    mass: SX
+    yaw_inertia: SX
+    height: SX
 
 
 @dataclass(frozen=True)
@@ -56,8 +57,8 @@ class PlanarContactMaps:
     """
 
     model: ContinuousModel
-    body: Callable[[ca.SX], PlanarBody]
-    observe: Callable[[ca.SX, ca.SX], ca.SX]
+    body: Callable[[SX], PlanarBody]
+    observe: Callable[[SX, SX], SX]
 
     def functions(self) -> list[ca.Function]:
         """Return the functions to export."""
@@ -65,7 +66,7 @@ class PlanarContactMaps:
             initialize_function(
                 self.model,
                 lambda state, _: _planar_twist(
-                    _planar_rotation(state[2]) @ state[3:5], ca.SX(0), state[5]
+                    _planar_rotation(state[2]) @ state[3:5], SX(0), state[5]
                 ),
                 lambda state, constants: _bullet_pose(state, self.body(constants)),
             ),
@@ -89,7 +90,7 @@ class PlanarContactMaps:
             end,
             _planar_twist(rates[0:2], lift, rates[2]),
             ca.vertcat(*positions),
-            ca.SX(0),
+            SX(0),
             bullet_pose=_bullet_pose(state, body),
             previous_vertical_load=ca.vertcat(load[0], load[2]),
         )
@@ -117,21 +118,21 @@ class PlanarContactMaps:
         )
 
 
-def _bullet_pose(state: ca.SX, body: PlanarBody) -> ca.SX:
+def _bullet_pose(state: SX, body: PlanarBody) -> SX:
     q = kinematics.quaternion_about_z(state[2])
     return ca.vertcat(state[0:2], body.height, q[1:4], q[0])
 
 
-def _planar_twist(horizontal: ca.SX, vertical: ca.SX, yaw_rate: ca.SX) -> ca.SX:
+def _planar_twist(horizontal: SX, vertical: SX, yaw_rate: SX) -> SX:
     return ca.vertcat(horizontal, vertical, 0, 0, yaw_rate)
 
 
-def _planar_rotation(yaw: ca.SX) -> ca.SX:
+def _planar_rotation(yaw: SX) -> SX:
     """Return the rotation matrix (2, 2) body to world frame."""
     return ca.vertcat(ca.horzcat(ca.cos(yaw), -ca.sin(yaw)), ca.horzcat(ca.sin(yaw), ca.cos(yaw)))
 
 
-def planar_outputs(state: ca.SX, height: ca.SX, deck: ca.SX) -> ca.SX:
+def planar_outputs(state: SX, height: SX, deck: SX) -> SX:
     """Return the motion outputs of a planar vessel and of its landing deck.
 
     Args:

@@ -15,6 +15,7 @@ import math
 from collections.abc import Sequence
 
 import casadi as ca
+from casadi import SX
 
 from cosim.export.equations.c_code import sum_over_rows
 
@@ -27,14 +28,14 @@ _RUDDER_ROW = 7
 
 
 def rudder_force(
-    u: ca.SX,
-    v: ca.SX,
-    race: ca.SX,
-    angle: ca.SX,
-    turn: tuple[ca.SX, ca.SX],
-    pressure_area: ca.SX,
-    stall_angle: ca.SX,
-) -> tuple[ca.SX, ca.SX]:
+    u: SX,
+    v: SX,
+    race: SX,
+    angle: SX,
+    turn: tuple[SX, SX],
+    pressure_area: SX,
+    stall_angle: SX,
+) -> tuple[SX, SX]:
     """Return surge and sway force (N) of a rudder.
 
     The lift is a sine of the angle of attack up to the stall angle, as in the published simulator
@@ -64,7 +65,7 @@ def _propeller_term() -> ca.Function:
     The common arguments are the velocity relative to the water (6), the depth of O and the change
     of the depth along x, y and z.
     """
-    common, row = ca.SX.sym("common", 10), ca.SX.sym("row", _PROPELLER_ROW)
+    common, row = SX.sym("common", 10), SX.sym("row", _PROPELLER_ROW)
     velocity, rates, depth, slope = common[0:3], common[3:6], common[6], common[7:10]
     position, axis = row[0:3], row[3:6]
     azimuth, speed, forward, reverse, advance, half_per_radius, at_rest = ca.vertsplit(row[6:])
@@ -86,7 +87,7 @@ def _rudder_term() -> ca.Function:
 
     The common arguments are u, v and r relative to the water.
     """
-    common, row = ca.SX.sym("common", 3), ca.SX.sym("row", _RUDDER_ROW)
+    common, row = SX.sym("common", 3), SX.sym("row", _RUDDER_ROW)
     u, v, r = ca.vertsplit(common)
     x, y, z, angle, race, pressure_area, stall_angle = ca.vertsplit(row)
     turn = sine_and_cosine(angle)
@@ -104,7 +105,7 @@ PROPELLER_SUM = sum_over_rows("propellers", _propeller_term(), MAX_PROPELLERS)
 RUDDER_SUM = sum_over_rows("rudders", _rudder_term(), MAX_RUDDERS)
 
 
-def derive_races(parameters: NamedValues) -> dict[str, ca.SX]:
+def derive_races(parameters: NamedValues) -> dict[str, SX]:
     """Return the constant "race" of vessels with rudders.
 
     It is 2 / (rho A) of the propeller ahead of each rudder (m2/s2/N), and 0 of the others. A row
@@ -122,7 +123,7 @@ def derive_races(parameters: NamedValues) -> dict[str, ca.SX]:
     return {"race": ca.vertcat(*rows)}
 
 
-def speeds(actuators: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
+def speeds(actuators: SX, inputs: NamedValues, constants: NamedValues) -> SX:
     """Return the propeller speeds (rad/s).
 
     The states of those with a lag, else the limited commands.
@@ -132,7 +133,7 @@ def speeds(actuators: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.
     )
 
 
-def speed_rates(actuators: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
+def speed_rates(actuators: SX, inputs: NamedValues, constants: NamedValues) -> SX:
     """Return the time derivatives of the propeller speeds (rad/s2), a first-order lag."""
     lag = constants["propeller_time_constant"]
     return ca.if_else(
@@ -140,24 +141,24 @@ def speed_rates(actuators: ca.SX, inputs: NamedValues, constants: NamedValues) -
     )
 
 
-def _commands(inputs: NamedValues, constants: NamedValues) -> ca.SX:
+def _commands(inputs: NamedValues, constants: NamedValues) -> SX:
     return _limited(
         inputs["propeller_speed"], -constants["max_reverse_speed"], constants["max_propeller_speed"]
     )
 
 
-def _limited(value: ca.SX, low: ca.SX, high: ca.SX) -> ca.SX:
+def _limited(value: SX, low: SX, high: SX) -> SX:
     return ca.fmin(ca.fmax(value, low), high)
 
 
 def propeller_loads(
-    speed: ca.SX,
-    flow: ca.SX,
-    depth: ca.SX,
-    slope: ca.SX,
+    speed: SX,
+    flow: SX,
+    depth: SX,
+    slope: SX,
     inputs: NamedValues,
     constants: NamedValues,
-) -> ca.SX:
+) -> SX:
     """Return the load (6) about O of all propellers.
 
     Args:
@@ -185,7 +186,7 @@ def propeller_loads(
     return PROPELLER_SUM(ca.vertcat(flow, depth, slope), constants["propeller_count"], table)
 
 
-def rudder_loads(speed: ca.SX, flow: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
+def rudder_loads(speed: SX, flow: SX, inputs: NamedValues, constants: NamedValues) -> SX:
     """Return the load (6) about O of all rudders.
 
     Args:
@@ -195,7 +196,7 @@ def rudder_loads(speed: ca.SX, flow: ca.SX, inputs: NamedValues, constants: Name
         constants: Constants of the equations.
     """
     if "rudder_count" not in constants:
-        return ca.SX.zeros(6)
+        return SX.zeros(6)
     limit = constants["max_rudder_angle"]
     thrust = constants["thrust_coefficient"] * ca.fmax(speed, 0) ** 2
     pressure = constants["water_density"] / 2 * constants["rudder_lift_coefficient"]
@@ -210,7 +211,7 @@ def rudder_loads(speed: ca.SX, flow: ca.SX, inputs: NamedValues, constants: Name
     return RUDDER_SUM(common, constants["rudder_count"], _table(columns, MAX_RUDDERS))
 
 
-def _table(columns: Sequence[ca.SX], rows: int) -> ca.SX:
+def _table(columns: Sequence[SX], rows: int) -> SX:
     """Return a table with `rows` rows, of which those beyond the columns are 0."""
     table = ca.horzcat(*columns)
-    return ca.vertcat(table, ca.SX.zeros(rows - table.rows(), table.columns()))
+    return ca.vertcat(table, SX.zeros(rows - table.rows(), table.columns()))

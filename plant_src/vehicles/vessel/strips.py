@@ -25,6 +25,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
+from casadi import SX
 
 from cosim.export.equations.c_code import sum_over_rows
 
@@ -57,29 +58,29 @@ class Strips:
         offset: Distance of the strips from the centre line (m).
     """
 
-    centre: ca.SX
-    spacing: ca.SX
-    offset: ca.SX
+    centre: SX
+    spacing: SX
+    offset: SX
 
     @property
-    def stations(self) -> list[ca.SX]:
+    def stations(self) -> list[SX]:
         """Positions of the stations ahead of the centre, from bow to stern (m)."""
         return [station * self.spacing for station in _STATIONS]
 
     @property
-    def mean_scale(self) -> ca.SX:
+    def mean_scale(self) -> SX:
         """Factors from the sums of `_wave_term` to mean heave, roll and pitch, shape (3,)."""
         return ca.vertcat(1, 1 / self.offset, 2 / (_MEAN_SQUARE * self.spacing)) / STATION_COUNT
 
     @property
-    def radii_squared(self) -> ca.SX:
+    def radii_squared(self) -> SX:
         """Squared radii of gyration of the waterplane (m2), shape (2,).
 
         They belong to the axes ahead and to port.
         """
         return ca.vertcat(self.offset**2, _MEAN_SQUARE * self.spacing**2)
 
-    def fit_plane(self, elevations: ca.SX) -> tuple[ca.SX, ca.SX]:
+    def fit_plane(self, elevations: SX) -> tuple[SX, SX]:
         """Return the plane through the strips by least squares.
 
         Args:
@@ -97,7 +98,7 @@ class Strips:
         return ca.sum1(both) / STRIP_COUNT, ca.vertcat(roll, pitch)
 
 
-def equivalent_strips(centre: ca.SX, moments: tuple[ca.SX, ca.SX], area: ca.SX) -> Strips:
+def equivalent_strips(centre: SX, moments: tuple[SX, SX], area: SX) -> Strips:
     """Return the strips with the second moments of a waterplane.
 
     Args:
@@ -121,11 +122,11 @@ class Box:
         wet_share: Weight of the station in `Immersion.wetness`, whose mean over the stations is 1.
     """
 
-    depth: ca.SX
-    middle: ca.SX
-    draught: ca.SX
-    volume_share: ca.SX | float = 1.0
-    wet_share: ca.SX | float = 1.0
+    depth: SX
+    middle: SX
+    draught: SX
+    volume_share: SX | float = 1.0
+    wet_share: SX | float = 1.0
 
 
 @dataclass(frozen=True)
@@ -143,10 +144,10 @@ class TwinHull:
     """
 
     strips: Strips
-    beam: ca.SX
-    draught: ca.SX
-    depth: ca.SX
-    area: ca.SX
+    beam: SX
+    draught: SX
+    depth: SX
+    area: SX
     stations: Sequence[Box] = ()
 
     @property
@@ -167,12 +168,12 @@ class Immersion:
             rest on, 0 in the air.
     """
 
-    volume: ca.SX
-    moment: ca.SX
-    wetness: ca.SX
+    volume: SX
+    moment: SX
+    wetness: SX
 
 
-def immersion(hull: TwinHull, up: ca.SX, height: ca.SX, elevations: ca.SX) -> Immersion:
+def immersion(hull: TwinHull, up: SX, height: SX, elevations: SX) -> Immersion:
     """Return the part of the boxes below the surface.
 
     A box is cut level at the elevation of its strip. The immersed share grows linearly over the
@@ -188,7 +189,7 @@ def immersion(hull: TwinHull, up: ca.SX, height: ca.SX, elevations: ca.SX) -> Im
     boxes, offset = hull.boxes, hull.strips.offset
     cuts = {box: _cut(hull, box, up, height) for box in boxes}
     reference = boxes[0].middle
-    total, moment, wetness = ca.SX(0), ca.SX.zeros(3), ca.SX(0)
+    total, moment, wetness = SX(0), SX.zeros(3), SX(0)
     for k, (box, x) in enumerate(zip(boxes, hull.strips.stations, strict=True)):
         scale, lowest_shift, base = cuts[box]
         heights = base + up[0] * x + up[1] * offset, base + up[0] * x - up[1] * offset
@@ -209,7 +210,7 @@ def immersion(hull: TwinHull, up: ca.SX, height: ca.SX, elevations: ca.SX) -> Im
     return Immersion(volume * total, volume * (moment + total * centre), wetness / STRIP_COUNT)
 
 
-def _cut(hull: TwinHull, box: Box, up: ca.SX, height: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+def _cut(hull: TwinHull, box: Box, up: SX, height: SX) -> tuple[SX, SX, SX]:
     """Return how the surface cuts a box.
 
     Returns:
@@ -243,18 +244,16 @@ class WaterMotion:
         angular_acceleration: Mean roll and pitch acceleration (rad/s2), shape (2,).
     """
 
-    elevations: ca.SX
-    heave: ca.SX
-    slopes: ca.SX
-    velocity: ca.SX
-    rates: ca.SX
-    acceleration: ca.SX
-    angular_acceleration: ca.SX
+    elevations: SX
+    heave: SX
+    slopes: SX
+    velocity: SX
+    rates: SX
+    acceleration: SX
+    angular_acceleration: SX
 
 
-def wave_table(
-    hull: TwinHull, amplitude: ca.SX, frequency: ca.SX, direction: ca.SX, phase: ca.SX
-) -> ca.SX:
+def wave_table(hull: TwinHull, amplitude: SX, frequency: SX, direction: SX, phase: SX) -> SX:
     """Return the table of components for `water_motion`, column by column.
 
     Args:
@@ -287,7 +286,7 @@ def _wave_term() -> ca.Function:
     and the same of the acceleration. Elevation, velocity and acceleration of a rigid mean m of the
     wave exp(i angle) are Re(m), w Im(m) and -w^2 Re(m).
     """
-    common, row = ca.SX.sym("common", 7), ca.SX.sym("row", _COLUMN_COUNT)
+    common, row = SX.sym("common", 7), SX.sym("row", _COLUMN_COUNT)
     x, y, time, ahead_x, ahead_y, port_x, port_y = ca.vertsplit(common)
     amplitude, kx, ky, frequency, phase, *speeds = ca.vertsplit(row)
     sine, cosine = (
@@ -321,13 +320,13 @@ WAVE_SUM = sum_over_rows("waves", _wave_term(), MAX_WAVE_COMPONENTS)
 
 
 def water_motion(
-    position: ca.SX,
-    attitude: ca.SX,
-    time: ca.SX,
+    position: SX,
+    attitude: SX,
+    time: SX,
     strips: Strips,
-    gain: ca.SX,
-    count: ca.SX,
-    table: ca.SX,
+    gain: SX,
+    count: SX,
+    table: SX,
 ) -> WaterMotion:
     """Return the motion of the water at the strips of a hull.
 

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import casadi as ca
+from casadi import SX
 
 from cosim.core.component import Variable
 from cosim.export.equations.c_code import Callee
@@ -43,7 +44,7 @@ from .strips import WAVE_SUM, TwinHull, wave_table
 MAX_STEP = 0.01
 
 
-def wave_table_of(parameters: NamedValues, hull: TwinHull) -> ca.SX:
+def wave_table_of(parameters: NamedValues, hull: TwinHull) -> SX:
     """Return the table of wave components (`strips.wave_table`) from the parameters `wave.*`."""
     return wave_table(
         hull,
@@ -71,10 +72,10 @@ class VesselModel:
     identifier: str
     description: str
     variables: Sequence[Variable]
-    derive_constants: Callable[[NamedValues], Mapping[str, ca.SX]]
+    derive_constants: Callable[[NamedValues], Mapping[str, SX]]
     hull: Callable[[NamedValues], Hull]
     actuators: Sequence[str] = ()
-    actuator_rate: Callable[[ca.SX, NamedValues, NamedValues], ca.SX] | None = None
+    actuator_rate: Callable[[SX, NamedValues, NamedValues], SX] | None = None
     callees: Sequence[Callee] = ()
 
     @cached_property
@@ -82,7 +83,7 @@ class VesselModel:
         """Map from the parameters to the constants of the equations."""
         return ConstantsMap(self.variables, self.derive_constants)
 
-    def hull_with(self, constants: ca.SX) -> Hull:
+    def hull_with(self, constants: SX) -> Hull:
         """Return the vessel for a vector of constants."""
         return self.hull(self.constants.by_name(constants))
 
@@ -113,16 +114,16 @@ class VesselModel:
             **options,
         )
 
-    def _actuator_rates(self, state: ca.SX, inputs: ca.SX, constants: ca.SX) -> ca.SX:
+    def _actuator_rates(self, state: SX, inputs: SX, constants: SX) -> SX:
         if self.actuator_rate is None:
-            return ca.SX.zeros(len(self.actuators))
+            return SX.zeros(len(self.actuators))
         given = values_by_name(inputs, variables_of(self.variables, "input"))
         return self.actuator_rate(
             state[len(VESSEL_STATES) :], given, self.constants.by_name(constants)
         )
 
 
-def normalised_state(state: ca.SX) -> ca.SX:
+def normalised_state(state: SX) -> SX:
     """Return the state with a unit quaternion."""
     return ca.vertcat(state[0:3], kinematics.normalised_quaternion(state[3:7]), state[7:])
 
@@ -130,12 +131,12 @@ def normalised_state(state: ca.SX) -> ca.SX:
 class BulletBody(NamedTuple):
     """Mass (kg) and moments of inertia about the body axes (kg m2) of the body in Bullet."""
 
-    mass: ca.SX
-    inertia: ca.SX
+    mass: SX
+    inertia: SX
 
 
 def floating_block(
-    model: ContinuousModel, vessel: VesselModel, body: Body | Callable[[ca.SX], BulletBody]
+    model: ContinuousModel, vessel: VesselModel, body: Body | Callable[[SX], BulletBody]
 ) -> Block:
     """Return a vessel for export: its FMU and the contact functions of the world.
 
@@ -145,7 +146,7 @@ def floating_block(
         body: Body in Bullet, or the function from the constants to its mass and inertia.
     """
     if isinstance(body, Body):
-        constant = BulletBody(ca.SX(body.mass), ca.SX(body.inertia))
+        constant = BulletBody(SX(body.mass), SX(body.inertia))
         return as_block(model, FloatingContactMaps(model, vessel, lambda _: constant).functions())
     return as_block(model, FloatingContactMaps(model, vessel, body).functions())
 
@@ -168,7 +169,7 @@ class FloatingContactMaps:
 
     model: ContinuousModel
     vessel: VesselModel
-    body: Callable[[ca.SX], BulletBody]
+    body: Callable[[SX], BulletBody]
 
     def functions(self) -> list[ca.Function]:
         """Return the functions to export."""
@@ -179,7 +180,7 @@ class FloatingContactMaps:
             create_elevation_function(),
         ]
 
-    def _twist(self, state: ca.SX, constants: ca.SX) -> ca.SX:
+    def _twist(self, state: SX, constants: SX) -> SX:
         frame = self.vessel.hull_with(constants).frame(state[3:7])
         angular = frame.attitude @ (frame.rates_to_angular_velocity @ state[10:13])
         return ca.vertcat(frame.to_world @ state[7:10], angular)
@@ -237,15 +238,15 @@ class FloatingContactMaps:
         )
 
 
-def _inertia_in_world(body: BulletBody, attitude: ca.SX) -> ca.SX:
+def _inertia_in_world(body: BulletBody, attitude: SX) -> SX:
     return attitude @ ca.diag(body.inertia) @ attitude.T
 
 
-def _impulse_about_centre(hull: Hull, attitude: ca.SX, impulse: ca.SX) -> ca.SX:
+def _impulse_about_centre(hull: Hull, attitude: SX, impulse: SX) -> SX:
     """Move an impulse (6) on O to the centre of mass."""
     lever = attitude @ hull.centre_of_mass
     return ca.vertcat(impulse[0:3], impulse[3:6] - ca.cross(lever, impulse[0:3]))
 
 
-def _bullet_pose(state: ca.SX) -> ca.SX:
+def _bullet_pose(state: SX) -> SX:
     return ca.vertcat(state[0:3], state[4:7], state[3])
