@@ -5,8 +5,6 @@ contains the profile at communication point n, and every other component reads t
 its step from n.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -114,7 +112,6 @@ def read_input_table(
     path: Path,
     targets: Mapping[str, Variable | None],
     interpolation: Interpolation,
-    where: str = "",
 ) -> InputTable:
     """Read an input table from a CSV file with a header and a first column `time` (s).
 
@@ -123,7 +120,6 @@ def read_input_table(
         targets: Columns that become outputs, with the variable whose type their values have; None:
             Float64. Other columns are ignored.
         interpolation: Interpolation between rows, see `InputTable`.
-        where: Place in the scenario that refers to the file, for messages.
 
     Raises:
         InputError: The file or a column is missing, a column occurs twice, a cell is not a value of
@@ -131,8 +127,7 @@ def read_input_table(
     """
     header, rows = read_rows(path)
     problems = [
-        Problem(f'profile "{path}" {text}', where)
-        for text in _header_violations(header, list(targets))
+        Problem(f'profile "{path}" {text}') for text in _header_violations(header, list(targets))
     ]
     if problems:
         raise InputError(problems)
@@ -142,7 +137,7 @@ def read_input_table(
     try:
         time, *values = _read_columns(rows, len(header), used)
     except ValueError as error:
-        raise InputError(Problem(f'profile "{path}":{error}', where)) from None
+        raise InputError(Problem(f'profile "{path}":{error}')) from None
     return make_input_table(time, dict(zip(targets, values, strict=True)), targets, interpolation)
 
 

@@ -31,7 +31,7 @@ from zipfile import BadZipFile, ZipFile
 from peer_comparison import last_line
 from virtual_environments import environment
 
-from cosim.export.foreign.windows_fmus import find_wine, prepare_wine
+from cosim.export.foreign import windows_fmus
 
 DRIVERS = Path(__file__).parent / "peers"
 #: other importers: name -> driver and requirements
@@ -209,8 +209,9 @@ def main() -> None:
         json.loads(arguments.json.read_text()) if arguments.json and arguments.json.exists() else {}
     )
     rows: list[tuple[Subject, dict[str, Attempt]]] = []
-    if find_wine():
-        prepare_wine()  # the first use takes a minute or two
+    if wine := windows_fmus.find_wine():  # the first use takes a minute or two
+        windows_fmus._prepared_prefix(wine)
+        windows_fmus._built_worker()
     for path in sorted(arguments.folder.rglob("*.fmu")):
         subject = read_subject(path.resolve(), arguments.folder.resolve())
         earlier = {

@@ -2,6 +2,8 @@
 
 import json
 
+from idle_folders import remove_idle_folders
+
 import cosim
 from cosim.components.fmi import api, file
 
@@ -26,7 +28,7 @@ def ring(folder, probe, size):
 
 
 def test_one_file_is_extracted_and_loaded_once(tmp_path, probe, monkeypatch):
-    file.remove_idle_folders()
+    remove_idle_folders()
     extracted, loaded = [], []
     extract, load_library = file.extract, api.load_library
     monkeypatch.setattr(file, "extract", lambda *args: extracted.append(args) or extract(*args))

@@ -24,11 +24,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from idle_folders import remove_idle_folders
 from matplotlib.figure import Figure
 from quick_compiler import compile_without_optimization
 
 from cosim.cli import main
-from cosim.components.fmi import file
 from cosim.components.python_import import load_object
 from cosim.core import resources
 from cosim.engine import ExecutorKind, executor_class, plan_run
@@ -227,7 +227,7 @@ def run_observed(arguments: list[str]) -> None:
     try:
         main(arguments)
     finally:
-        file.remove_idle_folders()
+        remove_idle_folders()
         after = process_state()
         report.write_text(
             "\n".join(

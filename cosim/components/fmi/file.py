@@ -85,17 +85,8 @@ def keep_folder(key: FileKey, extracted: ExtractedFolder, library: str) -> None:
         _idle_folders.pop(key).folder.cleanup()
     _idle_folders[key] = extracted
     if len(_idle_folders) > _MAX_FOLDERS:
-        _remove_oldest_folder()
-
-
-def _remove_oldest_folder() -> None:
-    _idle_folders.pop(next(iter(_idle_folders))).folder.cleanup()
-
-
-def remove_idle_folders() -> None:
-    """Remove the folders that are kept for further runs."""
-    while _idle_folders:
-        _remove_oldest_folder()
+        oldest = next(iter(_idle_folders))
+        _idle_folders.pop(oldest).folder.cleanup()
 
 
 def list_files(folder: str) -> Listing:

@@ -94,16 +94,6 @@ def windows_fmu(file: FmuFile) -> Path:
     )
 
 
-def prepare_wine() -> None:
-    """Create Wine's folder and compile the program that runs DLLs, unless they exist.
-
-    Raises:
-        InputError: Wine or the compiler failed.
-    """
-    _prepared_prefix(find_wine())
-    _built_worker()
-
-
 def _check_library(file: FmuFile) -> None:
     """Check the DLL without loading it."""
     model = file.examination.model

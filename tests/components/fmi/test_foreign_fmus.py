@@ -7,10 +7,11 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 from fakes import counter
+from idle_folders import remove_idle_folders
 from probe_fmus import build_probe_fmu
 from systems import endpoint, make_system, run_system
 
-from cosim.components.fmi import FmuFile, Isolation, create_component, file
+from cosim.components.fmi import FmuFile, Isolation, create_component
 from cosim.core.errors import ComponentError, InputError
 from cosim.core.time_grid import exact_fraction
 from cosim.engine.plan_run import simulate
@@ -237,7 +238,7 @@ def test_an_fmu_is_extracted_once_and_leaves_nothing_behind(
     )
     assert outcome.failure is None
     assert set(folder_counts) == {1}
-    file.remove_idle_folders()
+    remove_idle_folders()
     assert list(tmp_path.iterdir()) == []
 
 
