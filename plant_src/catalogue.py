@@ -19,6 +19,7 @@ import numpy as np
 
 from cosim.core.component import Causality, Variable
 from cosim.core.errors import InputError, Problem, did_you_mean
+from cosim.core.json_values import JsonObject
 from cosim.export.equations.exported_interface import describe_variables
 
 from .json_reader import argument_problem as warning
@@ -306,7 +307,7 @@ def _model(
 # Builders import the modules of their vehicles themselves: a run needs few of them.
 
 
-def _multirotor(name: str, data: Mapping[str, Any]) -> Model:
+def _multirotor(name: str, data: JsonObject) -> Model:
     from .vehicles.multirotor import airframe
 
     given = airframe.MultirotorReader().read(name, data, COMMON_KEYS)
@@ -314,14 +315,14 @@ def _multirotor(name: str, data: Mapping[str, Any]) -> Model:
     return _model(name, "multirotor", given, airframe, slots, airframe=given.vehicle)
 
 
-def _submerged(name: str, data: Mapping[str, Any]) -> Model:
+def _submerged(name: str, data: JsonObject) -> Model:
     from .vehicles.submerged import craft
 
     given = craft.SubmergedReader().read(name, data, COMMON_KEYS)
     return _model(name, "submerged", given, craft, craft.MAX_THRUSTERS, craft=given.vehicle)
 
 
-def _surface_vessel(name: str, data: Mapping[str, Any]) -> Model:
+def _surface_vessel(name: str, data: JsonObject) -> Model:
     from .vehicles.surface_vessel import surface_vessel
     from .vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
 
@@ -331,7 +332,7 @@ def _surface_vessel(name: str, data: Mapping[str, Any]) -> Model:
     return _model(name, "surface_vessel", given, surface_vessel, slots, **kind)
 
 
-def _planar_vessel(name: str, data: Mapping[str, Any]) -> Model:
+def _planar_vessel(name: str, data: JsonObject) -> Model:
     from .vehicles.planar_vessel import planar_vessel
     from .vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
 
@@ -351,7 +352,7 @@ FAMILIES = {
 }
 
 
-def model_from_data(data: Mapping[str, Any], name: str = "") -> Model:
+def model_from_data(data: JsonObject, name: str = "") -> Model:
     """Return the model of a vehicle that is given by its data.
 
     Args:
@@ -376,7 +377,7 @@ def model_from_data(data: Mapping[str, Any], name: str = "") -> Model:
     return replace(FAMILIES[family](str(data.get("name", name)), data), visual=read_visual(data))
 
 
-def _named_links(data: Mapping[str, Any]) -> Iterator[Problem]:
+def _named_links(data: JsonObject) -> Iterator[Problem]:
     """Yield a problem for each actuator whose place is a link of a URDF file."""
     for key in NAMED_LISTS:
         found = data.get(key)

@@ -1,13 +1,12 @@
 """Reader of JSON values that collects all problems instead of stopping at the first one."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cosim.core.errors import Problem, did_you_mean
+from cosim.core.json_values import JsonObject
 
 JsonPath = tuple[str, ...]
 Numbers = tuple[float, ...]
@@ -50,7 +49,7 @@ class JsonReader:
         if not any(each.subject[:-1] in places for each in misspelt):
             self.add_problem(path, f'"{key}" is missing, here and in "{common}"')
 
-    def read_named_objects(self, value: Any, path: JsonPath) -> Mapping[str, Any]:
+    def read_named_objects(self, value: Any, path: JsonPath) -> JsonObject:
         """Read an object whose keys become parts of variable names."""
         for name in (found := self.mapping(value, path)):
             if not re.fullmatch(r"[A-Za-z_]\w*", name):
@@ -62,7 +61,7 @@ class JsonReader:
 
     def read_object(
         self, value: Any, path: JsonPath, required: Sequence[str], optional: Sequence[str]
-    ) -> Mapping[str, Any]:
+    ) -> JsonObject:
         """Read an object with these keys and no others."""
         found = self.mapping(value, path)
         valid = (*required, *optional)
@@ -78,7 +77,7 @@ class JsonReader:
                 self.add_problem(path, f'"{key}" is missing')
         return found
 
-    def mapping(self, value: Any, path: JsonPath) -> Mapping[str, Any]:
+    def mapping(self, value: Any, path: JsonPath) -> JsonObject:
         """Read an object with any keys."""
         if isinstance(value, Mapping):
             return value

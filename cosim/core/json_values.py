@@ -6,7 +6,11 @@ NumPy values become lists and numbers.
 
 import json
 import sys
+from collections.abc import Mapping
 from typing import Any
+
+#: a JSON object that is only read
+JsonObject = Mapping[str, Any]
 
 
 def encode_value(value: Any) -> Any:

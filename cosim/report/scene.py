@@ -23,8 +23,6 @@ these keys (m, rad; world frame east-north-up; colours as in CSS):
   becomes true, such as a crash
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator, Mapping
 from inspect import getattr_static
@@ -32,6 +30,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, InputError, did_you_mean
+from ..core.json_values import JsonObject
 from ..results.files import to_json_types
 from ..scenario.component_sources import kind_of
 from ..scenario.extension import nested_content
@@ -58,7 +57,7 @@ _PART_DEFAULTS: Mapping[str, Any] = {
 }
 
 
-def build_scene(metadata: Mapping[str, Any]) -> dict[str, Any]:
+def build_scene(metadata: JsonObject) -> dict[str, Any]:
     """Return the scene of a run; it is empty if no component describes one.
 
     Args:
@@ -78,7 +77,7 @@ def build_scene(metadata: Mapping[str, Any]) -> dict[str, Any]:
     return scene
 
 
-def _scene_parts(scenario: Mapping[str, Any], folder: Path) -> Iterator[dict[str, Any]]:
+def _scene_parts(scenario: JsonObject, folder: Path) -> Iterator[dict[str, Any]]:
     """Yield the scenes that the components and the scenario itself describe."""
     components = list(flatten_components(scenario, folder))
     flat = {**scenario, "components": {name: component for name, component, _ in components}}
@@ -94,9 +93,7 @@ def _scene_parts(scenario: Mapping[str, Any], folder: Path) -> Iterator[dict[str
         )
 
 
-def static_method(
-    component: Mapping[str, Any], folder: Path, name: str
-) -> Callable[..., Any] | None:
+def static_method(component: JsonObject, folder: Path, name: str) -> Callable[..., Any] | None:
     """Return a static method of a Python component's class.
 
     None if there is none, or the component is not a Python class.
@@ -114,7 +111,7 @@ def static_method(
 
 
 def flatten_components(
-    system: Mapping[str, Any], folder: Path
+    system: JsonObject, folder: Path
 ) -> Iterator[tuple[str, dict[str, Any], Path]]:
     """Yield full name, component and folder of its paths of all components.
 
@@ -157,7 +154,7 @@ def _call_scene_function(
         raise ComponentError(owner, "scene", f"{type(error).__name__}: {error}") from error
 
 
-def _with_defaults(scene: Mapping[str, Any]) -> dict[str, Any]:
+def _with_defaults(scene: JsonObject) -> dict[str, Any]:
     """Return the scene with the defaults of missing keys.
 
     Raise TypeError or ValueError if it cannot be drawn.
@@ -182,7 +179,7 @@ def _with_defaults(scene: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _part_with_defaults(part: Mapping[str, Any]) -> dict[str, Any]:
+def _part_with_defaults(part: JsonObject) -> dict[str, Any]:
     shape, size = str(part.get("shape")), part.get("size", ())
     if shape not in SHAPE_SIZES:
         raise ValueError(f'unknown shape "{shape}"{did_you_mean(shape, SHAPE_SIZES)}')

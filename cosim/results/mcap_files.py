@@ -13,8 +13,6 @@ Simulation time 0 s is 1970-01-01 00:00 in the file. A run that starts before 0 
 start there.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -27,6 +25,7 @@ import numpy as np
 import pydantic_core
 
 from ..core.errors import InputError
+from ..core.json_values import JsonObject
 from ..core.recording import Recording
 from .files import iterate_chunks, to_json_types, writing_atomically
 
@@ -54,7 +53,7 @@ def require_mcap() -> None:
 def write_mcap(
     recording: Recording,
     path: str | Path,
-    scene: Mapping[str, Any] | None = None,
+    scene: JsonObject | None = None,
     metadata: Mapping[str, Any] | None = None,
 ) -> None:
     """Write an MCAP file; an existing file is replaced only when the new one is complete.
@@ -210,7 +209,7 @@ def _json_schema(node: Any, columns: list[np.ndarray], units: list[str]) -> dict
 _RING_CORNERS = 32
 
 
-def log_scene(scene: Mapping[str, Any], now: int, context: Any) -> None:
+def log_scene(scene: JsonObject, now: int, context: Any) -> None:
     """Log a scene (see `cosim.report.scene`) once, at the time `now` (ns), on the topic /scene."""
     from foxglove.channels import SceneUpdateChannel
     from foxglove.messages import SceneUpdate
@@ -230,7 +229,7 @@ def log_scene(scene: Mapping[str, Any], now: int, context: Any) -> None:
     SceneUpdateChannel("/scene", context=context).log(SceneUpdate(entities=entities), log_time=now)
 
 
-def _scene_entity(name: str, frame: str, parts: Sequence[Mapping[str, Any]], now: int) -> Any:
+def _scene_entity(name: str, frame: str, parts: Sequence[JsonObject], now: int) -> Any:
     from foxglove.messages import SceneEntity, Timestamp
 
     def primitives(*shapes: str) -> list[Any]:
@@ -248,13 +247,13 @@ def _scene_entity(name: str, frame: str, parts: Sequence[Mapping[str, Any]], now
     )
 
 
-def _cube_primitive(part: Mapping[str, Any]) -> Any:
+def _cube_primitive(part: JsonObject) -> Any:
     from foxglove.messages import CubePrimitive
 
     return CubePrimitive(pose=_pose(part), size=_size(*part["size"]), color=_colour(part))
 
 
-def _sphere_primitive(part: Mapping[str, Any]) -> Any:
+def _sphere_primitive(part: JsonObject) -> Any:
     from foxglove.messages import SpherePrimitive
 
     diameter = 2 * part["size"][0]
@@ -263,7 +262,7 @@ def _sphere_primitive(part: Mapping[str, Any]) -> Any:
     )
 
 
-def _cylinder_primitive(part: Mapping[str, Any]) -> Any:
+def _cylinder_primitive(part: JsonObject) -> Any:
     """Convert a cylinder (radius, length) or a cone (lower and upper radius, length)."""
     from foxglove.messages import CylinderPrimitive
 
@@ -280,7 +279,7 @@ def _cylinder_primitive(part: Mapping[str, Any]) -> Any:
     )
 
 
-def _line_primitive(part: Mapping[str, Any]) -> Any:
+def _line_primitive(part: JsonObject) -> Any:
     from foxglove.messages import LinePrimitive, LinePrimitiveLineType, Point3
 
     radius, thickness = part["size"]
@@ -306,7 +305,7 @@ _PRIMITIVES = {
 }
 
 
-def _pose(part: Mapping[str, Any]) -> Any:
+def _pose(part: JsonObject) -> Any:
     from foxglove.messages import Pose, Quaternion, Vector3
 
     (x, y, z), (qx, qy, qz, qw) = part["position"], part.get("orientation", (0.0, 0.0, 0.0, 1.0))
@@ -319,7 +318,7 @@ def _size(x: float, y: float, z: float) -> Any:
     return Vector3(x=x, y=y, z=z)
 
 
-def _colour(part: Mapping[str, Any]) -> Any:
+def _colour(part: JsonObject) -> Any:
     from foxglove.messages import Color
 
     red, green, blue = part["colour"]

@@ -4,8 +4,6 @@ The shapes have no influence on the dynamics. Dimensions come from the geometry 
 where it defines them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain
@@ -201,9 +199,9 @@ def platform_parts(
             )
 
 
-def tree_parts(seed: int = 4) -> Iterator[Part]:
+def tree_parts() -> Iterator[Part]:
     """Yield the parts of the trees on the banks north and west of the lake."""
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(4)
     for x in np.arange(-44.0, 90.0, 3.4):
         yield from single_tree_parts(
             x + random.uniform(-1.2, 1.2), 37.5 + random.uniform(0.0, 9.0), random

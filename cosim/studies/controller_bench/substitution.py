@@ -6,8 +6,6 @@ declares without its prefix is renamed. References are removed, since another co
 trajectories.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -16,6 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ...core.errors import InputError
+from ...core.json_values import JsonObject
 from ...results.files import write_json
 from ...scenario.component_schema import change_paths
 from ...scenario.component_sources import kind_of, texts_in
@@ -132,7 +131,7 @@ class ControllerSubstitution:
     # ---------------------------------------------------------------------------------------
 
     def _substitute_system(
-        self, value: Mapping[str, Any], folder: Path, prefix: str
+        self, value: JsonObject, folder: Path, prefix: str
     ) -> tuple[dict[str, Any], NameMap]:
         """Return a system that contains the candidate, and a map of the names that exist in it."""
         value = change_paths(value, relocating(folder, None))
@@ -165,7 +164,7 @@ class ControllerSubstitution:
 
     def _substitute_component(
         self,
-        spec: Mapping[str, Any],
+        spec: JsonObject,
         folder: Path,
         full_name: str,
         name: str,
@@ -208,7 +207,7 @@ class ControllerSubstitution:
         )
 
     def _substitute_nested(
-        self, system: Mapping[str, Any], folder: Path, full_name: str
+        self, system: JsonObject, folder: Path, full_name: str
     ) -> tuple[Path, NameMap] | None:
         """Change a nested system that contains a controller of the role.
 
@@ -236,7 +235,7 @@ class ControllerSubstitution:
         return path, renamed_outside
 
     def _prune_ports(
-        self, ports: Mapping[str, Any], renamed: NameMap
+        self, ports: JsonObject, renamed: NameMap
     ) -> tuple[dict[str, Any], dict[str, str]]:
         """Return the ports that lead to a variable of the changed system.
 
@@ -257,9 +256,7 @@ class ControllerSubstitution:
     # -- the scenario's own keys
     # ---------------------------------------------------------------------------------------
 
-    def _prune_scenario(
-        self, value: Mapping[str, Any], renamed: NameMap, folder: Path
-    ) -> dict[str, Any]:
+    def _prune_scenario(self, value: JsonObject, renamed: NameMap, folder: Path) -> dict[str, Any]:
         """Return a scenario without the entries that refer to variables which the candidate lacks.
 
         References are left out.
@@ -285,7 +282,7 @@ class ControllerSubstitution:
         return {**pruned, "inputs": value.get("inputs", [])}
 
     def _known_settings(
-        self, renamed: NameMap, settings: Mapping[str, Any], prefix: str = ""
+        self, renamed: NameMap, settings: JsonObject, prefix: str = ""
     ) -> dict[str, Any]:
         known = {}
         for name, value in settings.items():
@@ -293,9 +290,7 @@ class ControllerSubstitution:
                 known[new] = value
         return known
 
-    def _all_known(
-        self, renamed: NameMap, function: Mapping[str, Any], folder: Path, what: str
-    ) -> bool:
+    def _all_known(self, renamed: NameMap, function: JsonObject, folder: Path, what: str) -> bool:
         """Return whether all signals that a function needs exist; note the first that does not.
 
         An argument that `arguments_from` gives needs a variable in one of the sources.

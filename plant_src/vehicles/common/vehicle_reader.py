@@ -7,8 +7,6 @@ source:
     "mass": {"value": 500, "unit": "g", "source": "weighed"}
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,6 +16,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 import numpy as np
 
 from cosim.core.errors import InputError, Problem, abbreviate_names
+from cosim.core.json_values import JsonObject
 from cosim.core.units import KNOWN_UNITS, PREFIXED, Unit, parse_unit
 
 from ...json_reader import JsonPath, JsonReader, Numbers
@@ -46,7 +45,7 @@ class QuantityReader(JsonReader):
 
     def read_data(
         self, value: Any, path: JsonPath, required: Sequence[str], optional: Sequence[str]
-    ) -> Mapping[str, Any]:
+    ) -> JsonObject:
         """Read an object with these keys, those of TEXT_KEYS and no others."""
         found = self.read_object(value, path, required, (*optional, *TEXT_KEYS))
         for key in TEXT_KEYS:
@@ -112,7 +111,7 @@ class QuantityReader(JsonReader):
 
     def entry(
         self,
-        data: Mapping[str, Any],
+        data: JsonObject,
         key: str,
         unit: str,
         default: float = 1.0,
@@ -139,7 +138,7 @@ class QuantityReader(JsonReader):
 
     def read_vector(
         self,
-        data: Mapping[str, Any],
+        data: JsonObject,
         key: str,
         unit: str = "m",
         default: Sequence[float] = (0.0, 0.0, 0.0),
@@ -153,9 +152,7 @@ class QuantityReader(JsonReader):
             self.add_problem((*path, key), text)
         return x, y, z
 
-    def read_size(
-        self, data: Mapping[str, Any], path: JsonPath, default: Sequence[float]
-    ) -> Vector:
+    def read_size(self, data: JsonObject, path: JsonPath, default: Sequence[float]) -> Vector:
         """Read the edges "size" of a box (m)."""
         size = self.read_vector(data, "size", "m", default, path)
         if not min(size) > 0:
@@ -228,7 +225,7 @@ TORQUE_SIGNS = {"clockwise": 1.0, "counter-clockwise": -1.0}
 MAX_TRIANGLES = 20_000
 
 
-def read_visual(data: Mapping[str, Any]) -> np.ndarray | None:
+def read_visual(data: JsonObject) -> np.ndarray | None:
     """Return the triangles of the key "visual" (m, body frame), or None without this key.
 
     Args:
@@ -414,7 +411,7 @@ class VehicleReader(QuantityReader, Generic[_Vehicle]):
     optional_keys: Sequence[str]
     vehicle_class: Callable[..., _Vehicle]
 
-    def read_values(self, data: Mapping[str, Any]) -> dict[str, Any]:
+    def read_values(self, data: JsonObject) -> dict[str, Any]:
         """Read the attributes of the vehicle without its name, and its collision shape "boxes"."""
         raise NotImplementedError
 
@@ -422,7 +419,7 @@ class VehicleReader(QuantityReader, Generic[_Vehicle]):
         """Record what is wrong with a possible vehicle."""
 
     def read(
-        self, name: str, data: Mapping[str, Any], common_keys: Sequence[str]
+        self, name: str, data: JsonObject, common_keys: Sequence[str]
     ) -> VehicleData[_Vehicle]:
         """Read the data of a vehicle.
 
@@ -452,8 +449,8 @@ class VehicleReader(QuantityReader, Generic[_Vehicle]):
         return VehicleData(vehicle, boxes, crash_speed)
 
     def source_of(
-        self, key: str, data: Mapping[str, Any], path: JsonPath, common: Mapping[str, Any], of: str
-    ) -> tuple[Mapping[str, Any], JsonPath]:
+        self, key: str, data: JsonObject, path: JsonPath, common: JsonObject, of: str
+    ) -> tuple[JsonObject, JsonPath]:
         """Return the object that states a key of an element, and its path.
 
         Values of an element at `path` replace those of the object `common` of all elements, whose
@@ -461,11 +458,11 @@ class VehicleReader(QuantityReader, Generic[_Vehicle]):
         """
         return (data, path) if key in data else (common, (of,))
 
-    def read_label(self, data: Mapping[str, Any], path: JsonPath, kind: str) -> str:
+    def read_label(self, data: JsonObject, path: JsonPath, kind: str) -> str:
         """Read the label of an element; by default its kind and number."""
         return self.text(data.get("label", f"{kind} {int(path[-1]) + 1}"), (*path, "label"))
 
-    def elements(self, data: Mapping[str, Any], key: str) -> list[tuple[JsonPath, Any]]:
+    def elements(self, data: JsonObject, key: str) -> list[tuple[JsonPath, Any]]:
         """Read a list with at least one element; return its elements with their paths."""
         value = data.get(key, [{}])
         if not isinstance(value, list) or not value:
@@ -473,7 +470,7 @@ class VehicleReader(QuantityReader, Generic[_Vehicle]):
             return []
         return [((key, str(i)), each) for i, each in enumerate(value)] if key in data else []
 
-    def read_inertia(self, data: Mapping[str, Any]) -> np.ndarray:
+    def read_inertia(self, data: JsonObject) -> np.ndarray:
         """Read three moments of inertia, or three rows of a tensor."""
         value = data.get("inertia", [1.0] * 3)
         return self.read_matrix(value, ("inertia",), "xyz", "kg.m2", ("xx", "yy", "zz"))
@@ -487,7 +484,7 @@ class VehicleReader(QuantityReader, Generic[_Vehicle]):
             return BODY_UP
         return x / length, y / length, z / length
 
-    def read_boxes(self, data: Mapping[str, Any]) -> tuple[Collision, ...]:
+    def read_boxes(self, data: JsonObject) -> tuple[Collision, ...]:
         """Read the collision shape."""
         return tuple(self.read_box(box, path) for path, box in self.elements(data, "boxes"))
 

@@ -6,10 +6,8 @@ The arrays of the rotors have as many elements as the airframe has rotors, or mo
 all multirotors in a world are compiled once, for MAX_ROTORS rotors. Elements without a rotor are 0.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,6 +15,7 @@ import numpy as np
 
 from cosim.core.component import Variable
 from cosim.core.errors import Problem
+from cosim.core.json_values import JsonObject
 
 from ...json_reader import JsonPath
 from ...json_reader import argument_problem as warning
@@ -294,7 +293,7 @@ class MultirotorReader(VehicleReader[Airframe]):
 
     keys, optional_keys, vehicle_class = KEYS, _OPTIONAL_KEYS, Airframe
 
-    def read_values(self, data: Mapping[str, Any]) -> dict[str, Any]:
+    def read_values(self, data: JsonObject) -> dict[str, Any]:
         """Read the attributes of the airframe, and the collision shape."""
         common = self.read_data(data.get("rotor"), ("rotor",), ROTOR_KEYS, _ROTOR_OPTIONAL_KEYS)
         path = ("rotor",)
@@ -326,7 +325,7 @@ class MultirotorReader(VehicleReader[Airframe]):
             thrust = f"the thrust of all rotors at full speed is {lift:.4g} N along z"
             self.add_problem(path, f"it cannot fly: {thrust}, its weight {weight:.4g} N{hint}")
 
-    def read_hull(self, data: Mapping[str, Any], boxes: Sequence[Collision], mass: float) -> Hull:
+    def read_hull(self, data: JsonObject, boxes: Sequence[Collision], mass: float) -> Hull:
         """Read what water acts on.
 
         The box around all boxes, the displaced volume and the drag coefficient.
@@ -335,7 +334,7 @@ class MultirotorReader(VehicleReader[Airframe]):
         drag = self.entry(data, "water_drag_coefficient", "1", 1.0, low=0.0)
         return Hull(edges_around(boxes), volume, drag)
 
-    def read_rotor(self, common: Mapping[str, Any], value: Any, path: JsonPath) -> Rotor:
+    def read_rotor(self, common: JsonObject, value: Any, path: JsonPath) -> Rotor:
         """Read one rotor; its coefficients replace those of all rotors."""
         data = self.read_data(value, path, ("position", "turns"), ("label", "axis", *_COEFFICIENTS))
         coefficients = {}
@@ -350,7 +349,7 @@ class MultirotorReader(VehicleReader[Airframe]):
         axis = self.read_axis(data["axis"], (*path, "axis")) if "axis" in data else BODY_UP
         return Rotor(label, position, TORQUE_SIGNS[turns], axis=axis, **coefficients)
 
-    def read_effects(self, data: Mapping[str, Any], common: Mapping[str, Any]) -> RotorEffects:
+    def read_effects(self, data: JsonObject, common: JsonObject) -> RotorEffects:
         """Read the effects beyond thrust and torque; those that are missing are off."""
         path = ("rotor",)
 

@@ -8,10 +8,8 @@ equations of all submerged vehicles in a world are compiled once, for MAX_THRUST
 Elements without a thruster are 0.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,6 +17,7 @@ import numpy as np
 
 from cosim.core.component import Variable
 from cosim.core.errors import Problem
+from cosim.core.json_values import JsonObject
 
 from ...json_reader import JsonPath
 from ..common.interface import (
@@ -156,7 +155,7 @@ class SubmergedReader(VehicleReader[Craft]):
 
     keys, optional_keys, vehicle_class = KEYS, _OPTIONAL_KEYS, Craft
 
-    def read_values(self, data: Mapping[str, Any]) -> dict[str, Any]:
+    def read_values(self, data: JsonObject) -> dict[str, Any]:
         """Read the attributes of the craft, and the collision shape."""
         path = ("thruster",)
         common = self.read_data(data.get("thruster"), path, THRUSTER_KEYS, _THRUSTER_OPTIONAL_KEYS)
@@ -182,7 +181,7 @@ class SubmergedReader(VehicleReader[Craft]):
             ],
         }
 
-    def read_volume(self, data: Mapping[str, Any], boxes: tuple[Collision, ...]) -> dict[str, Any]:
+    def read_volume(self, data: JsonObject, boxes: tuple[Collision, ...]) -> dict[str, Any]:
         """Read what determines weight and buoyancy."""
         size = self.read_size(data, (), edges_around(boxes))
         volume = self.entry(data, "displaced_volume", "m3", above=0.0)
@@ -200,7 +199,7 @@ class SubmergedReader(VehicleReader[Craft]):
             "water_density": self.entry(data, "water_density", "kg/m3", 1025.0, above=0.0),
         }
 
-    def read_thruster(self, common: Mapping[str, Any], value: Any, path: JsonPath) -> Thruster:
+    def read_thruster(self, common: JsonObject, value: Any, path: JsonPath) -> Thruster:
         """Read one thruster; its coefficients replace those of all thrusters."""
         data = self.read_data(value, path, ("position", "axis"), ("label", "turns", *_COEFFICIENTS))
         if "thrust_coefficient" not in {*data, *common}:

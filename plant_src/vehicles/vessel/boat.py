@@ -7,10 +7,8 @@ chooses. SI units. Matrices belong to (u, v, r) of a planar vessel and to (u, v,
 floating one, about O.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -18,6 +16,7 @@ import numpy as np
 
 from cosim.core.component import Variable
 from cosim.core.errors import Problem
+from cosim.core.json_values import JsonObject
 
 from ...json_reader import JsonPath
 from ..common.interface import attribute_parameters, matrix_parameter
@@ -153,7 +152,7 @@ class BoatReader(VehicleReader[_Boat]):
 
     velocities: Sequence[str]
 
-    def read_boat(self, data: Mapping[str, Any], boxes: Sequence[Collision]) -> dict[str, Any]:
+    def read_boat(self, data: JsonObject, boxes: Sequence[Collision]) -> dict[str, Any]:
         """Read the attributes of `Boat` without its name, and the collision shape."""
         ones = [1.0] * len(self.velocities)
         added = self.read_nu_matrix(data, "added_mass", ones)
@@ -180,12 +179,12 @@ class BoatReader(VehicleReader[_Boat]):
         }
 
     def read_nu_matrix(
-        self, data: Mapping[str, Any], key: str, default: Any, path: JsonPath = ()
+        self, data: JsonObject, key: str, default: Any, path: JsonPath = ()
     ) -> np.ndarray:
         """Read a matrix that belongs to nu: its diagonal or its rows."""
         return self.read_matrix(data.get(key, default), (*path, key), self.velocities)
 
-    def read_propellers(self, data: Mapping[str, Any]) -> list[Propeller]:
+    def read_propellers(self, data: JsonObject) -> list[Propeller]:
         """Read all propellers; what they have in common is in "propeller"."""
         common = self.read_data(
             data.get("propeller", {}), ("propeller",), (), tuple(_PROPELLER_QUANTITIES)
@@ -195,7 +194,7 @@ class BoatReader(VehicleReader[_Boat]):
             for path, each in self.elements(data, "propellers")
         ]
 
-    def read_propeller(self, common: Mapping[str, Any], value: Any, path: JsonPath) -> Propeller:
+    def read_propeller(self, common: JsonObject, value: Any, path: JsonPath) -> Propeller:
         """Read one propeller; its quantities replace those of all propellers."""
         data = self.read_data(value, path, ("position",), ("label", "axis", *_PROPELLER_QUANTITIES))
         numbers: dict[str, float] = {}
@@ -217,7 +216,7 @@ class BoatReader(VehicleReader[_Boat]):
         axis = self.read_axis(data.get("axis", [1.0, 0.0, 0.0]), (*path, "axis"))
         return Propeller(label, position, axis, **numbers)
 
-    def read_rudders(self, data: Mapping[str, Any]) -> list[Rudder]:
+    def read_rudders(self, data: JsonObject) -> list[Rudder]:
         """Read all rudders; a vessel may have none."""
         given = self.elements(data, "rudders") if data.get("rudders") != [] else []
         return [self.read_rudder(each, path) for path, each in given]
