@@ -16,8 +16,6 @@ Arguments that several functions have:
     stop: Time (s) of the last row that counts, by default the last row.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

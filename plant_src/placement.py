@@ -1,7 +1,5 @@
 """Vehicles, platforms and obstacles of a world, with their positions."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ of the vessel: forward, left, and up along the normal of the deck. Arrays have o
 the result.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Views of variables in arrays that hold the values of several variables."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

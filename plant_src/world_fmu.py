@@ -5,8 +5,6 @@ To export another world, edit this file and run `cosim build plant_src/world_fmu
 my_world.fmu`. The host requires Python with this project and PyBullet installed.
 """
 
-from __future__ import annotations
-
 import json
 import weakref
 from collections.abc import Callable

@@ -6,8 +6,6 @@ the eigensystem realization algorithm (J.-N. Juang and R. S. Pappa, J. Guidance 
 a small matrix covers fast and slow modes.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Stability margins of a loop: gain, phase, delay and disk margin."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, nan, pi

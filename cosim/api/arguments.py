@@ -1,7 +1,5 @@
 """Checks of the types of arguments from Python, each with an error of one sentence."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Mapping
 from typing import Any, get_args

@@ -1,7 +1,5 @@
 """Evaluation of a run: its result with KPIs and checks."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager

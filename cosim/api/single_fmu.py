@@ -1,7 +1,5 @@
 """Simulation of a single FMU."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """Access to the variables of a simulation by their names."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial

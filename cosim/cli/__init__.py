@@ -3,8 +3,6 @@
 Each command imports its packages only when it runs, which keeps `cosim --help` fast.
 """
 
-from __future__ import annotations
-
 import atexit
 import gc
 import os

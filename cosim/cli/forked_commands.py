@@ -5,8 +5,6 @@ forked by a process that was forked from this one before this one started thread
 a process with threads must not be forked, and a command must not find what another one has changed.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import signal

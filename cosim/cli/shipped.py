@@ -3,8 +3,6 @@
 Scenarios, sweeps, vehicle models, controllers, roles of controllers and KPIs.
 """
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Execution of the same command in bubblewrap, while this process only waits.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -4,8 +4,6 @@ Exported FMUs contain a copy of this file. It imports only the standard library;
 only if NumPy is imported.
 """
 
-from __future__ import annotations
-
 import copy
 import random
 import sys

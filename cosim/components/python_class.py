@@ -3,8 +3,6 @@
 PythonFMU slaves, or classes that implement `Component` themselves.
 """
 
-from __future__ import annotations
-
 import inspect
 import sys
 from collections import Counter

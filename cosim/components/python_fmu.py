@@ -1,7 +1,5 @@
 """Adapter from PythonFMU classes to `Component`."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import operator

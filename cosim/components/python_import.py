@@ -6,8 +6,6 @@ name for all folders. Therefore absolute imports of modules in the folder are re
 ones, and two folders can have modules of the same name.
 """
 
-from __future__ import annotations
-
 import ast
 import importlib
 import os

@@ -6,8 +6,6 @@ Exported FMUs contain copies of this file and of `object_state.py`. They import 
 the standard library.
 """
 
-from __future__ import annotations
-
 import importlib
 import sys
 import traceback

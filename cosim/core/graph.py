@@ -1,7 +1,5 @@
 """Order of the nodes of a directed graph that may have cycles."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Iterable, Iterator, Mapping
 from heapq import heapify, heappop, heappush
 from typing import TypeVar

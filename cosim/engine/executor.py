@@ -1,7 +1,5 @@
 """Common base of the pure Python and the native executor, whose results are bit-identical."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from fractions import Fraction

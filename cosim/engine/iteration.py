@@ -11,8 +11,6 @@ differences, so each step costs one repetition per unknown, but loops that are n
 converge too. A step that does not reduce the residuals is halved (damped Newton).
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack

@@ -3,8 +3,6 @@
 A buffer with one array per dtype, each with one part per component.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

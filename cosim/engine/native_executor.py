@@ -1,7 +1,5 @@
 """The native executor: passes the plan to `_native.c`, which runs many macro steps per call."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable
 from fractions import Fraction

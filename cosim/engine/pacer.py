@@ -1,7 +1,5 @@
 """Wall time: pacing of a run to real time, and measurement of its parts."""
 
-from __future__ import annotations
-
 import time
 from array import array
 from collections.abc import Iterator

@@ -5,8 +5,6 @@ nor running them concurrently changes a value. Python components are excluded, s
 for each other's interpreter lock.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Executor that adds values to inputs while it steps, for linearisation and frequency responses."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Sequence, Set
 from functools import partial

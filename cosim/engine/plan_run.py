@@ -3,8 +3,6 @@
 Initialize its components, step them with events and observers, and free them in every case.
 """
 
-from __future__ import annotations
-
 import os
 import tempfile
 from bisect import bisect_left, bisect_right

@@ -1,7 +1,5 @@
 """The pure Python executor, which calls C functions through ctypes and is always available."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain, compress, pairwise

@@ -4,8 +4,6 @@ The executors record every `every`-th communication point. Further rows may lie 
 several rows may have the same time. A recording that does not fit on the disk is refused before.
 """
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby

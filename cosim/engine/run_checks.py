@@ -1,7 +1,5 @@
 """Checks of a system and its settings before a run, and of variables to set during a run."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence, Set
 from dataclasses import replace

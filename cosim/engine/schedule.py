@@ -1,7 +1,5 @@
 """The steps of a plan as numbered calls."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """Settings of one simulation run."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction

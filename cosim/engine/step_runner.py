@@ -4,8 +4,6 @@ A scheduled step is a sequence of prepared calls. Each returns a status or a res
 be finite.
 """
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Iterable
 from typing import NamedTuple

@@ -3,8 +3,6 @@
 A separate module, since importing `concurrent.futures` takes milliseconds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import TypeVar

@@ -6,8 +6,6 @@ pure Python executor calls functions that copy contiguous runs as memory, few va
 others with NumPy.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass, replace

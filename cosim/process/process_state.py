@@ -5,8 +5,6 @@ restores it. Reading all of them takes much longer than one call of a component.
 extension module encodes most of them as bytes, and Python reads them only if these have changed.
 """
 
-from __future__ import annotations
-
 import ctypes
 import errno
 import locale

@@ -1,7 +1,5 @@
 """Figures that compare runs: with a reference, and by their real-time factors."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

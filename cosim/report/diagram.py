@@ -3,8 +3,6 @@
 Components in the order of their stages from left to right, and their connections.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

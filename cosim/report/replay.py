@@ -3,8 +3,6 @@
 Its data contain each run in a compact form: 32-bit floats, downsampled and compressed.
 """
 
-from __future__ import annotations
-
 import base64
 import math
 import zlib

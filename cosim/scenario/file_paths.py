@@ -1,7 +1,5 @@
 """Paths of files in the JSON of scenarios and nested systems."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from pathlib import Path

@@ -5,8 +5,6 @@ this file, and the name of an STL, OBJ or GLB file at the key "mesh" for its tri
 from the folder of the file that contains the text.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path

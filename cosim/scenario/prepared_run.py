@@ -1,7 +1,5 @@
 """Preparation of a scenario: read it, create its components, connect and check them."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

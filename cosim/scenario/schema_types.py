@@ -1,7 +1,5 @@
 """Types of values in scenario files, and the base class of their data model."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping

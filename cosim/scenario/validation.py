@@ -3,8 +3,6 @@
 Invalid parts are reported and removed, so that the rest can be read.
 """
 
-from __future__ import annotations
-
 import json
 import types
 import typing

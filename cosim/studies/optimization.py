@@ -1,7 +1,5 @@
 """Optimization in the unit cube: parameters as coordinates, methods and constraints."""
 
-from __future__ import annotations
-
 import ast
 import math
 from collections.abc import Callable, Mapping, Sequence

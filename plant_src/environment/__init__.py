@@ -1,7 +1,5 @@
 """Environment of the vehicles: waves, wind, current, and the surface below a multirotor."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from cosim.core.errors import InputError

@@ -12,8 +12,6 @@ the covariances are P11 = p, P12 = P22 = p / 2, and the variance of y is b^2 p +
 (1 - b) p.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -11,8 +11,6 @@ of the spreading function D(d) ~ cos^n(d - mean), |d - mean| < pi/2 (DNV-RP-C205
 assigned in random order. Without spreading all components have the mean direction.
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Callable, Mapping

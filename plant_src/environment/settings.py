@@ -15,8 +15,6 @@ The argument is a JSON object such as
 Every key is optional; plant_src/README.md lists meanings, units and defaults.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

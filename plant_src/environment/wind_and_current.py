@@ -13,8 +13,6 @@ the vehicle, because multirotors and vessels are slow compared with the wind. Gu
 functions of time alone. Those of different vehicles are independent.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -8,8 +8,6 @@ axis, measured from `reference_position`. The result for each vehicle thus depen
 step alone; safe distances only avoid repeating the search.
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Sequence

@@ -10,8 +10,6 @@ A vehicle of one shape on a vehicle of several shapes, for example a multirotor 
 cause this.
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Callable, Mapping, Sequence

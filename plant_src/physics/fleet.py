@@ -3,8 +3,6 @@
 Their arrays lie in one buffer, so that one copy saves their state.
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from collections import Counter

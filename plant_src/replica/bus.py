@@ -8,8 +8,6 @@ The signals have its order and its frames:
 - Body frame of the vessel: x forward, y left, z up; yaw counter-clockwise (rad).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from cosim.core.component import Variable

@@ -1,7 +1,5 @@
 """Base class of the replica's PythonFMU classes, with variables by name, and their PID loops."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass

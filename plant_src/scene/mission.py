@@ -1,7 +1,5 @@
 """Poses of the vehicles of a recorded mission, and named cameras that follow them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

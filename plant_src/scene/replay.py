@@ -4,8 +4,6 @@ The description follows from the scenario alone. World frame, z up, m; colours o
 green, blue in 0 ... 1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import cycle
 from typing import Any

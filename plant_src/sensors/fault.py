@@ -1,7 +1,5 @@
 """Fault injection for signals of actuators and sensors."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections import deque

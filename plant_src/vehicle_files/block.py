@@ -1,7 +1,5 @@
 """Export of a vehicle that is given by a file."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """URDF file as XML elements with their lines, so that an error names file, line and link."""
 
-from __future__ import annotations
-
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence

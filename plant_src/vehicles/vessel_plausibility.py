@@ -3,8 +3,6 @@
 Thrust, resistance, places and angles of propellers.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 

@@ -1,7 +1,5 @@
 """`cosim new vehicle`: the data of a vehicle, as a copy of a shipped vehicle file."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

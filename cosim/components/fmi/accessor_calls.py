@@ -1,7 +1,5 @@
 """Prepared calls of fmi*Get... and fmi*Set..., which transfer the bound variables."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import groupby

@@ -5,8 +5,6 @@ functions are called directly with prepared arguments, because FMPy's own method
 as long.
 """
 
-from __future__ import annotations
-
 import ctypes
 import logging
 from abc import ABC, abstractmethod

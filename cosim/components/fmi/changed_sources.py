@@ -1,7 +1,5 @@
 """Comparison of an FMU with the sources from which `cosim build` made it."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import suppress

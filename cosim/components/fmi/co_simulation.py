@@ -1,7 +1,5 @@
 """Co-Simulation of FMUs: the FMU integrates, with events and early return in FMI 3.0."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ FMI functions return a status. ctypes assumes an int result when no `restype` is
 tenth less time per call than an explicit `restype`.
 """
 
-from __future__ import annotations
-
 import ctypes
 import inspect
 from _ctypes import FUNCFLAG_CDECL, FUNCFLAG_PYTHONAPI, CFuncPtr

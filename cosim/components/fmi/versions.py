@@ -1,7 +1,5 @@
 """The C functions of FMI 1.0, 2.0 and 3.0."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Sequence
 from contextlib import suppress

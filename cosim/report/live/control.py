@@ -8,8 +8,6 @@ A command is a JSON object: {"command": "pause"}, "resume", "step" (one macro st
 "paused" and "speed", and with "error" if the command was refused.
 """
 
-from __future__ import annotations
-
 import json
 import select
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The live view of a run: the HTTP server of its page and the pipe to the simulation process."""
 
-from __future__ import annotations
-
 import os
 import sys
 import time

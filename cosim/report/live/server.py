@@ -1,7 +1,5 @@
 """HTTP server of the live page: local requests with the secret token only."""
 
-from __future__ import annotations
-
 import json
 import socket
 import time

@@ -3,8 +3,6 @@
 State of the run, its rows, and commands to it.
 """
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Mapping

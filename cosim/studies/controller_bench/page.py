@@ -4,8 +4,6 @@ Descriptions of KPI values are those of the docstrings of their functions, which
 executed.
 """
 
-from __future__ import annotations
-
 import ast
 import math
 import re

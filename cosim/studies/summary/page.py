@@ -4,8 +4,6 @@ The page needs no network. A replay is named after the key of its run and a hash
 that it is written once and belongs to one sweep only.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -3,8 +3,6 @@
 Distributions of KPIs and success rates, over all runs and by the levels of factors.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from array import array
@@ -68,7 +66,7 @@ class RunGroup:
     distinct: int = 0
     failed: int = 0
     passed: int = 0
-    kpis: dict[str, array[float]] = field(default_factory=dict)
+    kpis: dict[str, "array[float]"] = field(default_factory=dict)
     booleans: set[str] = field(default_factory=set)
     _shared_keys: set[str] = field(default_factory=set)
 

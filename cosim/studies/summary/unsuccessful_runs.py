@@ -3,8 +3,6 @@
 The criteria that they miss, and the commands that repeat them.
 """
 
-from __future__ import annotations
-
 import json
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -3,8 +3,6 @@
 The plant has one input for both (equation 10 of the paper).
 """
 
-from __future__ import annotations
-
 import casadi as ca
 from casadi import SX
 

@@ -3,8 +3,6 @@
 Surge has no damping.
 """
 
-from __future__ import annotations
-
 import casadi as ca
 from casadi import SX
 

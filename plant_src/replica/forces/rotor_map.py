@@ -3,8 +3,6 @@
 The speed w follows the throttle without delay.
 """
 
-from __future__ import annotations
-
 import casadi as ca
 from casadi import SX
 

@@ -6,8 +6,6 @@ Proportional to a sine of the angle of attack up to the stall angle, constant be
 behind the centre of mass.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 

@@ -37,8 +37,6 @@ A pose in Bullet is (position, quaternion x y z w), a twist (velocity, angular v
 the world frame.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ They are accurate to 1e-13 or better. Unlike those of the C library they are bit
 machines, and the compiler vectorizes them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import zip_longest

@@ -5,8 +5,6 @@ mass. Rotations follow the right-hand rule: positive roll lifts the left side, p
 the nose, positive yaw is counter-clockwise from above.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 

@@ -3,8 +3,6 @@
 Quaternions are (w, x, y, z) and rotate body vectors into the world frame.
 """
 
-from __future__ import annotations
-
 import casadi as ca
 from casadi import SX
 

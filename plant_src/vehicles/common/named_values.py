@@ -1,7 +1,5 @@
 """CasADi vectors addressed by the names of the variables that they hold."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

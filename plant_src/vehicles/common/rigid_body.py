@@ -5,8 +5,6 @@ unit quaternion (body to world) and the angular velocity (rad/s, body frame), in
 `interface.FREE_STATES`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple

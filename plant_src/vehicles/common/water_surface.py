@@ -4,8 +4,6 @@ It is a CasADi function that the binaries of vehicles call in C.
 The elevation is the sum over components of a cos(k (x cos d + y sin d) - w t + phase).
 """
 
-from __future__ import annotations
-
 import casadi as ca
 from casadi import SX
 

@@ -3,8 +3,6 @@
 The folder is a package, so that copies of the plant, for example in an FMU, contain the files.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 FOLDER = Path(__file__).parent

@@ -33,8 +33,6 @@ All values are parameters. One binary holds the equations for up to MAX_ROTORS r
 a rotor have the coefficients 0.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import NamedTuple

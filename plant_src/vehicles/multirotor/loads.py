@@ -34,8 +34,6 @@ neglected. The aerodynamic loads of a rotor are those of the speed n_i e_i, with
 level) / R + 1/2, 0, 1) of the height z_i of its hub.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

@@ -9,8 +9,6 @@ share of a strip is the sum of those of its edges minus 1. The share of a rectan
 of those of its two strips, which is exact beside one edge.
 """
 
-from __future__ import annotations
-
 import math
 
 import casadi as ca

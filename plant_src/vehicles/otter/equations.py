@@ -4,8 +4,6 @@ The pontoons are strips whose bottoms rise from bow to stern. README.md has the 
 `vehicles/README.md` the rest.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """Variables of the Otter, in the order of the equations."""
 
-from __future__ import annotations
-
 from cosim.core.component import Variable
 from cosim.core.units import parse_unit
 

@@ -3,8 +3,6 @@
 README.md has the loads.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import casadi as ca

@@ -8,8 +8,6 @@ Hydrodynamics and Motion Control, 2nd edition. The values are converted from the
 right, z down: y and z of vectors change their sign. Values from elsewhere are marked [assumed].
 """
 
-from __future__ import annotations
-
 import math
 
 from ..common.shapes import Body, Box

@@ -3,8 +3,6 @@
 README.md has the loads, `vehicles/README.md` the rest.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import casadi as ca

@@ -13,8 +13,6 @@ tau are the loads of propellers, rudders and air, and the external load at the c
 binary holds the equations of all planar vessels; all values are parameters.
 """
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 from casadi import SX

@@ -1,7 +1,5 @@
 """Vessels in the horizontal plane (surge, sway, yaw): reader of their data, and variables."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any

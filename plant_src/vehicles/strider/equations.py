@@ -8,8 +8,6 @@ The resistance is friction by the ITTC-57 line on the wetted surface (ITTC 1957,
 Madrid), and a residuary part that is a smooth curve over the Froude number (`parameters.py`).
 """
 
-from __future__ import annotations
-
 import math
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """Variables of the catamaran, in the order of the equations."""
 
-from __future__ import annotations
-
 from ..common.interface import (
     CURRENT_INPUTS,
     EXTERNAL_LOADS,

@@ -7,8 +7,6 @@ Rapid Control Design in Aerial and Maritime Drone Teams"
 (github.com/OmarVelascoAnrar/UAV_USV_Simulator, commit 1eee757); [paper] its Table 2.
 """
 
-from __future__ import annotations
-
 import math
 
 from ..common.shapes import Body, Box

@@ -3,8 +3,6 @@
 README.md has the loads, `vehicles/README.md` the rest.
 """
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 from casadi import SX

@@ -1,7 +1,5 @@
 """Variables of the catamaran in six degrees of freedom, in the order of the equations."""
 
-from __future__ import annotations
-
 from ..common.interface import (
     EXTERNAL_LOADS,
     FLOATING_INITIAL_PARAMETERS,

@@ -6,8 +6,6 @@ The draught follows from the geometry: the bottom of the hulls is 0.144 m below 
 which floats 0.1245 m above the water. The height of the rigid body is part of the state.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import product
 

@@ -28,8 +28,6 @@ solution for held commands.
 All values are parameters. One binary holds the equations for up to MAX_THRUSTERS thrusters.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product

@@ -4,8 +4,6 @@
 all floating vessels; all values are parameters.
 """
 
-from __future__ import annotations
-
 from itertools import product
 
 import casadi as ca

@@ -3,8 +3,6 @@
 One hull or two, whose strips the surface of the water cuts.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ equations of all vessels of a family are compiled once, for MAX_PROPELLERS and M
 without a propeller or rudder are 0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

@@ -12,8 +12,6 @@ State: position of O (m, world frame), unit quaternion, nu, time (s), and the st
 actuators.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

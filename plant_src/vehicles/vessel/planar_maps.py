@@ -1,7 +1,5 @@
 """Contact functions (`common/contact_maps.py`) and outputs of vessels in the horizontal plane."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -9,8 +9,6 @@ The race of a propeller adds 2 max(c_i n_i |n_i|, 0) / (rho A_i) to the squared 
 rudder, as in the momentum theory of the actuator disc.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

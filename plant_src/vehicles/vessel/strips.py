@@ -19,8 +19,6 @@ angles only: those of the phase at the centre and of the phase of one spacing. A
 give the other stations and both hulls.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

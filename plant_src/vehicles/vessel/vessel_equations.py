@@ -1,7 +1,5 @@
 """Equations of a vessel in six degrees of freedom for export, and its contact functions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

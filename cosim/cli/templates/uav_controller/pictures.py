@@ -1,7 +1,5 @@
 """Figure of a run, and the vehicles in its 3-D replay."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

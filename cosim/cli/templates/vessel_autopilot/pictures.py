@@ -1,7 +1,5 @@
 """Figure of a run, and the vessel in its 3-D replay."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

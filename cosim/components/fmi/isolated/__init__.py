@@ -16,8 +16,6 @@ A worker process is forked from the importer, which takes some milliseconds. A s
 line in each direction. Every wait for an answer has a deadline.
 """
 
-from __future__ import annotations
-
 import ctypes
 import math
 import os

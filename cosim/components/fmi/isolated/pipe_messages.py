@@ -5,8 +5,6 @@ process may have written the values of an answer. Therefore each function that c
 one of `INVALID_ANSWER_ERRORS` for a value that is not of the expected form.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import select

@@ -1,7 +1,5 @@
 """Memory shared by the importer process and one worker process."""
 
-from __future__ import annotations
-
 import ctypes
 import mmap
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Worker side of an isolated FMU: executes the importer's commands on one FMU instance."""
 
-from __future__ import annotations
-
 import gc
 import logging
 import os

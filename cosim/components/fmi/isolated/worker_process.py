@@ -1,7 +1,5 @@
 """Start, supervision and end of a worker process, in the importer process."""
 
-from __future__ import annotations
-
 import os
 import select
 import signal

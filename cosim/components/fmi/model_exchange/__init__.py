@@ -1,7 +1,5 @@
 """Model Exchange of FMUs: the importer integrates the states and handles the events."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

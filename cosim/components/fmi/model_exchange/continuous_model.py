@@ -1,7 +1,5 @@
 """An FMU in Continuous-Time Mode, its linear inputs, and the interface of its integrators."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable, Mapping
 from enum import IntFlag

@@ -3,8 +3,6 @@
 Events take effect at the end of the step where they occur.
 """
 
-from __future__ import annotations
-
 import ctypes
 import math
 from collections.abc import Mapping, Sequence

@@ -5,8 +5,6 @@ those that FMPy contains. Its own wrapper passes over internal steps, leaves mem
 prints errors of callbacks instead of raising them.
 """
 
-from __future__ import annotations
-
 import ctypes
 import math
 import os

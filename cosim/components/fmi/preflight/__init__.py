@@ -1,7 +1,5 @@
 """Preflight check of an FMU, made before any of its code runs and any of its files is extracted."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -3,8 +3,6 @@
 All headers are checked before any data are read, and the read data are bounded.
 """
 
-from __future__ import annotations
-
 import os
 import stat
 import unicodedata

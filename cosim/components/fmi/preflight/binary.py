@@ -1,7 +1,5 @@
 """Check of an FMU's library for a platform, without loading it."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path

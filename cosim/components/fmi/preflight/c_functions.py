@@ -1,7 +1,5 @@
 """C functions of FMI: those that a library has to export, and those that the importer calls."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from ....core.component import DTYPES

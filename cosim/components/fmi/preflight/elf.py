@@ -4,8 +4,6 @@ Format and field names: System V ABI 4.1, chapters 4 and 5. The reader follows t
 the dynamic loader: program headers, dynamic section, symbol table and symbol hash table.
 """
 
-from __future__ import annotations
-
 import re
 import struct
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """Rules of the preflight check, and findings of their violations."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Literal, NamedTuple

@@ -3,8 +3,6 @@
 Format and field names: Apple's mach-o/loader.h, fat.h and nlist.h.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Model description as unchecked text, in the same form for FMI 2.0 and FMI 3.0."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

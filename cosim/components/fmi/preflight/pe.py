@@ -3,8 +3,6 @@
 Format and field names: Microsoft PE/COFF specification, sections 3 to 6.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 

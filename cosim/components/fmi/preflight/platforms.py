@@ -1,7 +1,5 @@
 """Platforms of FMUs, and what reading a shared library of any of them yields."""
 
-from __future__ import annotations
-
 import platform
 import struct
 import sys

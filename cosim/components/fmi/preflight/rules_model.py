@@ -4,8 +4,6 @@ Names, interface, units, types, default experiment, log categories, outputs, con
 and initial unknowns.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator

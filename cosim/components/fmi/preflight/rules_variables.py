@@ -4,8 +4,6 @@ Names, causality, variability, value references, references to other definitions
 and max, and the sizes of arrays.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections import defaultdict

@@ -3,8 +3,6 @@
 All data of the archive, and all XML files against their schemas.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib.util import find_spec

@@ -3,8 +3,6 @@
 No DOCTYPE and therefore no entities and no external files, and limits of the document's size.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

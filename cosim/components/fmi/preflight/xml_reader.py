@@ -1,7 +1,5 @@
 """Conversion of the XML elements of modelDescription.xml to a `ModelDescription`."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence

@@ -7,8 +7,6 @@ contradictory headers, so that two programs can see different contents in the sa
 PKWARE APPNOTE 6.3.10, sections 4.3 and 4.5.
 """
 
-from __future__ import annotations
-
 import os
 import struct
 from io import BufferedReader

@@ -1,7 +1,5 @@
 """Lowering of Modelica's built-in functions to C."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import reduce

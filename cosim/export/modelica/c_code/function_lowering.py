@@ -3,8 +3,6 @@
 One C function per combination of argument shapes, so that all sizes are constant.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any

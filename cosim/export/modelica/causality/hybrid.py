@@ -20,8 +20,6 @@ synchronous data flow principle, 1999). Between events comparisons keep their va
 integration sees smooth equations; a crossing of their operands is located and is the next event.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import chain

@@ -9,8 +9,6 @@ Continuous System Simulation, 2006, chapter 7). Systems are not torn: Newton's m
 unknowns of a component.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Hashable, Sequence
 from typing import TypeVar
 

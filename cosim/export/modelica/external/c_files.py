@@ -4,8 +4,6 @@ The generated file external_calls.c has one C function for each external functio
 reports errors by its result.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

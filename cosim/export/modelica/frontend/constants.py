@@ -4,8 +4,6 @@ Literals can determine array sizes, slices and loop ranges. The FMU contains Str
 calls of functions only.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial

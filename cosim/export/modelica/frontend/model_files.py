@@ -6,8 +6,6 @@ file that the model needs is left out. The selection depends on the contents of 
 only: files beside them that are not used change nothing.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

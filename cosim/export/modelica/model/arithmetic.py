@@ -5,8 +5,6 @@ Where Python would raise an exception, the result is that of IEEE 754 (NaN or in
 NumPy arrays that are computed element by element.
 """
 
-from __future__ import annotations
-
 import math
 import operator
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Construction of scalar expressions without terms and factors that are zero or one."""
 
-from __future__ import annotations
-
 from .syntax_tree import Binary, Expression, Literal, Unary
 from .traversal import rewrite
 

@@ -3,8 +3,6 @@
 It runs in process or, exported, as an FMU.
 """
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 
