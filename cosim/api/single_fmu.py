@@ -73,9 +73,9 @@ def simulate(
         start_values: Parameters and start values by the names of the variables.
         output: Names of the recorded variables; None: all outputs.
         isolation: "fmu" runs the FMU in a separate process.
-        solver: "euler", "rk4" or "cvode" simulates by Model Exchange; None: by Co-Simulation if
-            the FMU has it, else with cvode.
-        solver_step_size: Largest step size (s) of euler and rk4; None: that of the default
+        solver: A method of `cosim.core.integration_methods` simulates by Model Exchange; None: by
+            Co-Simulation if the FMU has it, else with cvode.
+        solver_step_size: Largest step size (s) of a fixed-step method; None: that of the default
             experiment, else `step_size`.
         tolerance: Relative tolerance of the FMU and of cvode; None: that of the default experiment.
 
@@ -186,7 +186,7 @@ def parse_solver(method: Method | None, step_size: float | str | None) -> Solver
     """Return the settings of a solver; None if there is no method.
 
     Args:
-        method: "euler", "rk4", "cvode" or None.
+        method: Integration method, or None.
         step_size: Largest step size (s) of a method with fixed step size.
 
     Raises:

@@ -362,9 +362,11 @@ class Component(Protocol):
 
     def get_state(self) -> Any:
         """Return a snapshot that only this component can read."""
+        return None
 
-    def set_state(self, state: Any) -> None:
+    def set_state(self, state: Any) -> None:  # noqa: ARG002
         """Restore a snapshot bit for bit; it may be restored again."""
+        return
 
     def free_state(self, state: Any) -> None:  # noqa: ARG002
         """Release the memory of a snapshot."""

@@ -56,7 +56,7 @@ class _Figure(_Function):
 
 class _ScenarioComponent(_Part):
     python: str | None = None
-    system: str | None = None
+    system: str | dict[str, Any] | None = None
     parameters: dict[str, Any] = {}
     arguments: dict[str, Any] = {}
 

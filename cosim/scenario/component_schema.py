@@ -50,7 +50,8 @@ class _AnyComponent(Spec):
                 f"expected exactly one of {', '.join(kinds)}; found {' and '.join(given) or 'none'}"
             )
         for name in type(self).model_fields:
-            if name not in kinds[given[0]].model_fields and getattr(self, name):
+            is_given = name in self.model_fields_set and getattr(self, name) not in (None, [], {})
+            if is_given and name not in kinds[given[0]].model_fields:
                 owners = [kind for kind in kinds.values() if name in kind.model_fields]
                 keys = " or ".join(f'"{kind.KEY}"' for kind in owners)
                 verb = "are" if name.endswith("s") else "is"
@@ -102,7 +103,9 @@ def _optional(field: FieldInfo) -> tuple[Any, FieldInfo]:
     """Return annotation and field of a key that components of other kinds do not have."""
     if not field.is_required():
         return field.annotation, field
-    annotation: Any = Annotated[(field.annotation, *field.metadata)]
+    annotation: Any = field.annotation
+    if field.metadata:
+        annotation = Annotated[(annotation, *field.metadata)]
     return annotation | None, key(
         str(field.description), (field.examples or [None])[0], default=None
     )

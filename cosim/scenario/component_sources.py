@@ -27,7 +27,6 @@ from ..components.fmi import (
     create_component,
     open_fmu,
 )
-from ..components.fmi.settings import Method
 from ..components.python_import import load_object
 from ..core.component import Component, Variable
 from ..core.errors import (
@@ -36,6 +35,7 @@ from ..core.errors import (
     describe_exception,
     nearest_file,
 )
+from ..core.integration_methods import METHODS, Method
 from ..core.paths import is_file, resolve_path
 from ..export.foreign import add_binary
 from .schema_types import (
@@ -222,8 +222,7 @@ class SolverSpec(Spec):
     """Integration of a Model Exchange FMU."""
 
     method: Method = key(
-        '"euler", "rk4": explicit methods with fixed step size; "cvode": BDF with variable '
-        "step size and root finding",
+        "; ".join(f'"{name}": {info.description}' for name, info in METHODS.items()),
         "euler",
     )
     step_size: Period | None = key(
@@ -237,9 +236,10 @@ class SolverSpec(Spec):
 
     @model_validator(mode="after")
     def _check_step_size(self) -> SolverSpec:
-        if self.step_size is not None and self.method == "cvode":
+        if self.step_size is not None and METHODS[self.method].variable_step:
             raise ValueError(
-                '"step_size" is for methods with fixed step size; "cvode" has a "tolerance"'
+                '"step_size" is for methods with fixed step size; '
+                f'"{self.method}" has a "tolerance"'
             )
         return self
 

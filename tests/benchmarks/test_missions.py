@@ -49,7 +49,9 @@ def contenders_of(scenario: str | Path) -> dict[str, Callable[[], float]]:
         for executor in executors()
     }
     return contenders | {
-        "cosim, nothing recorded": lambda: step_cost(scenario, executors()[0], columns={})
+        "cosim, nothing recorded": lambda: step_cost(
+            scenario, executors()[0], columns={}, stop_conditions=()
+        )
     }
 
 

@@ -254,3 +254,10 @@ def test_the_schema_for_editors_knows_inline_systems(system, is_valid):
     assert Draft202012Validator(editor_schema()).is_valid(scenario) == is_valid
     nested = {"components": {"a": {"system": system}}}
     assert Draft202012Validator(editor_schema(nested=True)).is_valid(nested) == is_valid
+
+
+def test_a_run_with_an_inline_system_is_compared(folder):
+    system = {"components": {"g": folder.block("Gain", parameters={"k": 2.0})}}
+    scenario = folder.scenario({"a": {"system": system}})
+    cosim.run(scenario).write(folder.path / "run")
+    assert cosim.compare(folder.path / "run", folder.path / "run").passed

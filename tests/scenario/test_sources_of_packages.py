@@ -23,20 +23,22 @@ def block(title):
     return text
 
 
+def install(site, name, code, sources):
+    """Write a package of one module into the folder `site` as pip does."""
+    about = site / f"{name}-1.0.dist-info"
+    about.mkdir(parents=True)
+    (site / f"{name}.py").write_text(code)
+    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    entries = ["[cosim.sources]", *(f"{key} = {value}" for key, value in sources.items())]
+    (about / "entry_points.txt").write_text("\n".join(entries))
+
+
 @pytest.fixture
 def installed(tmp_path):
     """Folder with the package of the page as pip installs it."""
-    site = tmp_path / "site"
-    (site / "recordings-1.0.dist-info").mkdir(parents=True)
-    (site / "recordings.py").write_text(block("recordings/recordings.py"))
     project = tomllib.loads(block("recordings/pyproject.toml"))["project"]
-    lines = ["Metadata-Version: 2.1", f"Name: {project['name']}", f"Version: {project['version']}"]
-    (site / "recordings-1.0.dist-info/METADATA").write_text("\n".join(lines))
-    entries = ["[cosim.sources]"]
-    entries += [
-        f"{name} = {value}" for name, value in project["entry-points"]["cosim.sources"].items()
-    ]
-    (site / "recordings-1.0.dist-info/entry_points.txt").write_text("\n".join(entries))
+    site, sources = tmp_path / "site", project["entry-points"]["cosim.sources"]
+    install(site, project["name"], block("recordings/recordings.py"), sources)
     return site
 
 
@@ -103,6 +105,7 @@ def test_extending_files_settings_and_bundles_find_its_files(folder):
         ({"recording": "w.csv"}, '$.components.wind: cannot read "w.csv"'),
         ({"fmu": "a.fmu"}, "expected exactly one of fmu, python, modelica, system, recording"),
         ({"solver": {"method": "euler"}}, '"solver" is for components with "fmu"'),
+        ({"period": "x"}, "$.components.wind.period: expected seconds"),
     ],
 )
 def test_problems_name_its_keys(replay, folder, keys, text):
@@ -114,6 +117,56 @@ def test_problems_name_its_keys(replay, folder, keys, text):
 def test_a_key_of_the_kind_belongs_to_it(folder):
     (line,) = folder.problems({"a": folder.block("Gain", offset=1.0)})
     assert '"offset" is for components with "recording"' in line
+
+
+@pytest.mark.usefixtures("recordings")
+def test_defaults_of_the_kind_are_no_keys_of_others(folder):
+    (line,) = folder.problems({"a": folder.block("Gain", period="x")})
+    assert "$.components.a.period: expected seconds" in line
+
+
+CONSTANT = """
+from cosim.core.component import Component, Variable
+from cosim.scenario.component_sources import ComponentSource, key
+
+class Constant(Component):
+    has_state = False
+    binds_everything = True
+    variables = [Variable("y", causality="output")]
+
+    def get(self, name):
+        return self.value
+
+    def bind(self, inputs, outputs):
+        (self.outputs,) = outputs.arrays.values()
+
+    def get_outputs(self):
+        self.outputs[:] = self.value
+
+class Source(ComponentSource):
+    KEY = "constant"
+    constant: float = key("value of the output y", 1.5)
+
+    def create(self, creation):
+        component = Constant()
+        component.value = self.constant
+        return component
+"""
+
+
+def test_the_key_may_hold_a_number(folder, tmp_path, monkeypatch):
+    install(tmp_path / "site", "constants", CONSTANT, {"constant": "constants:Source"})
+    monkeypatch.syspath_prepend(tmp_path / "site")
+    forget_kinds()
+    try:
+        assert cosim.run(folder.scenario({"c": {"constant": 2.5}}))["c.y"].tolist()[0] == 2.5
+        (line,) = folder.problems({"c": {"constant": "x"}})
+        assert "$.components.c.constant: expected a valid number" in line
+        (line,) = folder.problems({"c": {"constnt": 2.5}})
+        assert 'did you mean "constant"?' in line
+    finally:
+        forget_kinds()
+        sys.modules.pop("constants", None)
 
 
 def test_without_the_package_the_key_is_unknown(replay, folder):

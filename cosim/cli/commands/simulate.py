@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from ...core.integration_methods import METHODS
 from ...core.paths import duplicate_descriptor
 from ...core.text import count_noun
 from ...process.output_lock import LOCK_FILE, LockKeeper, acquire_lock
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--solver",
-    type=click.Choice(["euler", "rk4", "cvode"]),
+    type=click.Choice(list(METHODS)),
     help=(
         "Simulate by Model Exchange with this method; default: by Co-Simulation if the FMU has it, "
         "else with cvode."
@@ -54,7 +55,10 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--solver-step-size",
-    help="Largest step size (s) of euler and rk4; default: the FMU's, else --step-size.",
+    help=(
+        "Largest step size (s) of a method with fixed step size; default: the FMU's, else "
+        "--step-size."
+    ),
 )
 @click.option(
     "--tolerance",

@@ -1,11 +1,12 @@
 """FMUs as components; the only package that uses FMPy at run time."""
 
+from ...core.integration_methods import Method
 from .co_simulation import CoSimulationFmu
 from .description import DefaultExperiment, FmuDescription
 from .driver import FmuComponent, FmuDriver
 from .file import FmuFile, open_fmu
 from .preflight.model_description import Interface
-from .settings import InstanceSettings, Isolation, Method, SolverSettings
+from .settings import InstanceSettings, Isolation, SolverSettings
 
 __all__ = [
     "DefaultExperiment",

@@ -7,15 +7,13 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
+from ...core.integration_methods import METHODS, Method
 from ...process.journal import Deadlines
 from .description import DefaultExperiment, FmuDescription
 from .preflight.model_description import Interface
 
-#: integration method: explicit Euler and Runge-Kutta of order 4 at fixed step size, or CVODE with
-#: variable step size
-Method = Literal["euler", "rk4", "cvode"]
 #: relative tolerance of a solver with variable step size, if neither the settings nor the FMU have
 #: one
 DEFAULT_TOLERANCE = 1e-6
@@ -102,8 +100,8 @@ class InstanceSettings:
 
         None is the communication step size.
         """
-        if self.method == "cvode":
-            return {"method": "cvode", "tolerance": self.solver_tolerance(experiment)}
+        if METHODS[self.method].variable_step:
+            return {"method": self.method, "tolerance": self.solver_tolerance(experiment)}
         step_size = self.solver_step_size(experiment)
         return {"method": self.method, "step_size": None if step_size is None else float(step_size)}
 

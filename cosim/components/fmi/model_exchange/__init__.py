@@ -115,11 +115,11 @@ class ModelExchangeFmu(FmuDriver):
     ) -> Sequence[PreparedCall]:
         """Prepare the calls that set the inputs, integrate one step and get the outputs."""
         self.api.current_time = current_time
-        _, events = self._running
+        integrator, events = self._running
         inputs: Sequence[PreparedCall] = ()
         if self._inputs.variables:
             inputs = events.continuous_calls
-            if events.discrete_calls or self._settings.method == "cvode":
+            if events.discrete_calls or integrator.needs_input_changes:
                 inputs = [PreparedCall(events.apply_inputs, (), "inputs")]
         return [*inputs, self._prepare_integration(step_size), *self._get_calls]
 

@@ -31,7 +31,14 @@ class StepEvent(NamedTuple):
 
 
 class Integrator(Protocol):
-    """Integrator of one FMU instance in Continuous-Time Mode."""
+    """Integrator of one FMU instance in Continuous-Time Mode.
+
+    Attributes:
+        needs_input_changes: `inputs_changed` is called before each step with other inputs; an
+            integrator that keeps slopes or a history from step to step needs it.
+    """
+
+    needs_input_changes: bool = True
 
     @property
     def time(self) -> float:

@@ -11,10 +11,10 @@ from fractions import Fraction
 import numpy as np
 
 from ....core.component import NativeDoStep, PreparedCall
+from ....core.integration_methods import Method
 from ....core.time_grid import exact_fraction
 from ..api import DISCARD, OK
 from ..library import GilReleasingFunction, as_pointer, function_address
-from ..settings import Method
 from .continuous_model import ContinuousModel, EventKind, IntegrationError, Integrator, StepEvent
 
 try:
@@ -81,6 +81,8 @@ class FixedStepIntegrator(Integrator):
 
     It is in C if the extension was built, else in Python with the same results.
     """
+
+    needs_input_changes = False
 
     def __init__(self, model: ContinuousModel, method: Method, step_size: Fraction | None):
         """Prepare the integration.

@@ -19,6 +19,7 @@ from cosim.components.fmi import (
     create_component,
 )
 from cosim.components.fmi.model_exchange import fixed_step
+from cosim.core.integration_methods import METHODS
 from cosim.core.system import Connection, System
 from cosim.engine.plan_run import simulate
 from cosim.engine.settings import Settings
@@ -26,9 +27,17 @@ from cosim.engine.settings import Settings
 pytestmark = pytest.mark.usefixtures("executor")
 
 
-def ramp_system(path, method, step_size=None, isolation=None, fault=0, interpolation="linear"):
+def ramp_system(
+    path,
+    method,
+    step_size=None,
+    isolation=None,
+    fault=0,
+    interpolation="linear",
+    tolerance=None,
+):
     settings = InstanceSettings(
-        None, SolverSettings(method, Fraction(step_size) if step_size else None)
+        tolerance, SolverSettings(method, Fraction(step_size) if step_size else None)
     )
     parts = {"clock": clock(), "ball": create_component(FmuFile(path), "ball", settings, isolation)}
     ramp = Connection(
@@ -52,6 +61,18 @@ def test_cvode_and_rk4_see_the_ramp_at_every_time(ball):
         ramp_system(ball, "rk4", "1/100", interpolation="hold"), 1, "0.1", ["ball.x"]
     ).columns["ball.x"]
     assert abs(held[-1] - exact(1)) > 0.03
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_hears_of_a_held_input_that_changes(ball, method):
+    """In each step of 0.1 s the input is held, and x' = u - x has a closed solution."""
+    system = ramp_system(ball, method, "1/10000", interpolation="hold", tolerance=1e-5)
+    found = run_system(system, 1, "0.1", ["ball.x"]).columns["ball.x"]
+    x = found[0]
+    for n in range(10):
+        held = 1 + 2 * (n + 1) / 10
+        x = held + (x - held) * math.exp(-0.1)
+        assert found[n + 1] == pytest.approx(x, abs=1e-4)
 
 
 @pytest.mark.parametrize("compiled", [True, False], ids=["C", "Python"])
