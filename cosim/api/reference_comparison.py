@@ -19,7 +19,7 @@ from ..scenario.file_paths import SHIPPED
 from .arguments import expect, is_number
 
 if TYPE_CHECKING:
-    from ..report.runs import NamedCall
+    from ..results.kpi import NamedCall
 
 #: number of names in the line that lists what has changed since a reference was made
 MAX_LISTED_CHANGES = 5

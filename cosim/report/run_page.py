@@ -21,7 +21,7 @@ from .replay import find_failure, replay_data
 from .tables import format_number
 
 if TYPE_CHECKING:
-    from .runs import NamedCall
+    from ..results.kpi import NamedCall
 
 #: labels of timings in the order of the run
 TIMING_LABELS = {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, cast
@@ -21,12 +20,10 @@ from pydantic import (
 from ..core.errors import InputError
 from ..core.json_values import is_number, parse_object
 from ..results import Kpis, Result, RunMetadata
+from ..results.kpi import NamedCall
 from ..scenario.json_document import read_document
 from ..scenario.named_functions import load_function
 from ..scenario.validation import schema_problems
-
-#: name, function and keyword arguments of a figure
-NamedCall = tuple[str, Callable[..., Any], Mapping[str, Any]]
 
 
 def _check_kpi(value: Any) -> Any:

@@ -39,6 +39,8 @@ from .result import Result
 Signal = str
 #: prefix of names of recorded signals, up to a dot or bracket, such as "plant.uav"
 Prefix = str
+#: name, function and keyword arguments of a KPI or figure
+NamedCall = tuple[str, Callable[..., Any], Mapping[str, Any]]
 KpiFunction = TypeVar("KpiFunction", bound=Callable[..., Any])
 
 #: name of an argument, in a declared unit
@@ -187,9 +189,7 @@ def declared_units(function: Callable[..., Any]) -> Mapping[str, str]:
     return unit_of
 
 
-def evaluate_kpis(
-    result: Result, kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]]
-) -> dict[str, Number]:
+def evaluate_kpis(result: Result, kpis: Iterable[NamedCall]) -> dict[str, Number]:
     """Evaluate KPIs.
 
     Args:
@@ -233,7 +233,7 @@ def _checked_number(evaluation: ResultFunction, key: str, value: Any) -> Number:
 
 
 def kpi_units(
-    kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]],
+    kpis: Iterable[NamedCall],
     names: Iterable[str],
     signal_units: Mapping[str, str] = MappingProxyType({}),
 ) -> dict[str, str]:
@@ -293,9 +293,7 @@ def kpi_notes(
     return notes
 
 
-def kpi_senses(
-    kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]], names: Iterable[str]
-) -> dict[str, str]:
+def kpi_senses(kpis: Iterable[NamedCall], names: Iterable[str]) -> dict[str, str]:
     """Return "lower" or "higher" for those KPI values that declare it (see `better`).
 
     Args:

@@ -1,7 +1,7 @@
 """Preparation of a scenario: read it, create its components, connect and check them."""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
@@ -28,6 +28,7 @@ from ..process.float_mode import default_float_mode
 from ..process.journal import Deadlines, current_journal
 from ..process.process_state import exclusive_process_state
 from ..results import RunMetadata
+from ..results.kpi import NamedCall
 from .component_sources import ComponentFactory
 from .evaluation_schema import FunctionSpec
 from .file_paths import SHIPPED
@@ -41,9 +42,6 @@ from .system_builder import PROFILE_PREFIX, SystemBuilder
 IsolationMode = Literal["fmu", "none"]
 #: time (s) in Python
 TimeValue = float | str | Fraction | Decimal
-
-#: name, function and keyword arguments of a KPI or figure
-NamedCall = tuple[str, Callable[..., Any], Mapping[str, Any]]
 
 
 @dataclass(frozen=True, repr=False)

@@ -15,14 +15,11 @@ from ..core.size_limits import MAX_RUNS
 from .execution.run_store import RunStore
 from .execution.worker_pool import LocalRunner
 from .regression import RegressionOutcome, default_folder, run_regressions
-from .study import Study
+from .study import Study, StudySource
 from .summary.sweep_files import SweepSummary, write_sweep_files
 from .sweep import Sweep, SweepRow
 from .tune import Trial, Tuning, write_tuning_files
 from .worst_case import Attempt, WorstCase, write_worst_case_files
-
-#: a study file, the name of a shipped study, or the content of a study file
-StudySource = str | Path | Mapping[str, Any]
 
 
 @dataclass(frozen=True)

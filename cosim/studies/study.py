@@ -30,6 +30,8 @@ from .execution.job import Job, Record, Runner, StudyContext, run_key
 from .execution.run_store import RunStore
 from .schema import StudySpec
 
+#: a study file, the name of a shipped study, or the content of a study file
+StudySource = str | Path | Mapping[str, Any]
 #: callback after every run
 RecordObserver = Callable[[Record], None]
 
@@ -240,9 +242,7 @@ def _json_path(pointer: str) -> str:
     return json_path([int(key) if key.isdigit() else key for key in pointer_keys(pointer)])[1:]
 
 
-def read_study(
-    file: str | Path | Mapping[str, Any], kind: type[S], max_runs: int = MAX_RUNS
-) -> StudyFile[S]:
+def read_study(file: StudySource, kind: type[S], max_runs: int = MAX_RUNS) -> StudyFile[S]:
     """Read a sweep or tuning from a file, or a shipped one by its name.
 
     Args:

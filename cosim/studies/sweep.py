@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, islice
-from pathlib import Path
 from typing import Any
 
 from ..core.errors import InputError, Problem
@@ -23,6 +22,7 @@ from .study import (
     RecordObserver,
     Study,
     StudyFile,
+    StudySource,
     read_study,
     run_pending,
 )
@@ -58,7 +58,7 @@ class Sweep:
     design: Design
 
     @classmethod
-    def from_file(cls, file: str | Path | Mapping[str, Any], max_runs: int = MAX_RUNS) -> Sweep:
+    def from_file(cls, file: StudySource, max_runs: int = MAX_RUNS) -> Sweep:
         """Read a sweep file, or a shipped sweep by its name.
 
         Args:

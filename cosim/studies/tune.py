@@ -48,6 +48,7 @@ from .study import (
     RecordObserver,
     Study,
     StudyFile,
+    StudySource,
     read_study,
     run_pending,
 )
@@ -105,7 +106,7 @@ class Tuning:
     observed_kpis: ObservedKpis = field(default_factory=ObservedKpis)
 
     @classmethod
-    def from_file(cls, file: str | Path | Mapping[str, Any], max_runs: int = MAX_RUNS) -> Tuning:
+    def from_file(cls, file: StudySource, max_runs: int = MAX_RUNS) -> Tuning:
         """Read a tuning file, or a shipped tuning by its name.
 
         Args:

@@ -28,6 +28,7 @@ from .study import (
     RecordObserver,
     Study,
     StudyFile,
+    StudySource,
     read_study,
     run_pending,
 )
@@ -65,7 +66,7 @@ class WorstCase:
     observed_kpis: ObservedKpis = field(default_factory=ObservedKpis)
 
     @classmethod
-    def from_file(cls, file: str | Path | Mapping[str, Any], max_runs: int = MAX_RUNS) -> WorstCase:
+    def from_file(cls, file: StudySource, max_runs: int = MAX_RUNS) -> WorstCase:
         """Read a file, or a shipped search by its name.
 
         Args:

@@ -57,7 +57,7 @@ class ModelReader(StatementReader):
                 self.read_body(algorithm["statements"]) for algorithm in self.json["algorithms"]
             ),
             asserts=tuple(self._assert(node) for node in self.json["assert_equations"]),
-            initial_equations=self.read_equations("initial_equations"),
+            initial_equations=self.read_initial_equations(),
             initial_algorithms=tuple(
                 self.read_body(algorithm["statements"])
                 for algorithm in self.json["initial_algorithms"]
@@ -159,9 +159,9 @@ class ModelReader(StatementReader):
 
     # equations
 
-    def read_equations(self, section: str) -> tuple[Equation, ...]:
-        """Convert the equations of a section of the document."""
-        return tuple(chain.from_iterable(map(self._equation, self.json[section])))
+    def read_initial_equations(self) -> tuple[Equation, ...]:
+        """Convert the initial equations."""
+        return tuple(chain.from_iterable(map(self._equation, self.json["initial_equations"])))
 
     def _unrolled_equations(self) -> Iterator[Equation]:
         """Yield all equations, with the placeholders of for-equations replaced."""
