@@ -100,6 +100,32 @@ end M;""")
         assert (model.get("y"), model.get("z")) == (y, z)
 
 
+def test_a_branch_that_a_constant_excludes_may_have_subscripts_out_of_range(compile_both):
+    model = compile_both("""package P
+  constant Integer axes = 2;
+  function height
+    input Real position[axes];
+    output Real y;
+  algorithm
+    if axes > 2 then
+      y := position[3];
+    else
+      y := 0.5*position[2];
+    end if;
+  end height;
+end P;
+model M
+  input Real u[2];
+  output Real y;
+equation
+  when sample(0, 0.01) then
+    y = P.height(u);
+  end when;
+end M;""")
+    for _, inputs in model.simulate(10):
+        assert model.get("y") == 0.5 * inputs["u"][1]
+
+
 def test_an_algorithm_without_when_is_computed_at_every_event(compile_both):
     model = compile_both("""model M
   input Real u;

@@ -56,6 +56,31 @@ end M;""")
         assert list(model.get("y")) == [inputs["u"]] * 3
 
 
+def test_calls_with_constant_arguments_are_sizes_steps_and_bounds_inside_functions(compile_both):
+    model = compile_both("""package P
+  function raised
+    input Real u;
+    output Real y;
+  algorithm
+    y := sum(fill(u, integer(3.7)));
+    for i in max(1, 0):div(5, 2):5 loop
+      y := y + i;
+    end for;
+  end raised;
+end P;
+model M
+  input Real u;
+  output Real y;
+equation
+  when sample(0, 0.01) then
+    y = P.raised(u);
+  end when;
+end M;""")
+    for _, inputs in model.simulate(10):
+        u = inputs["u"]
+        assert model.get("y") == u + u + u + 1 + 3 + 5
+
+
 def test_matrix_products_transpose_and_slices(compile_both):
     model = compile_both("""model M
   input Real A[2, 3];

@@ -124,6 +124,19 @@ def test_land_hides_only_what_is_behind_it(monkeypatch):
     assert far.colour.any()
 
 
+def test_the_shore_is_sand_and_the_land_behind_it_is_green(monkeypatch):
+    monkeypatch.setattr("plant_src.scene.landscape.BANKS", [ONE_BANK])
+    view = View(np.array([0.0, 0.0, 3.0]), np.array([9.0, 0.5, 0.1]))
+    picture = Picture(np.zeros((80, 160, 3), np.uint8), np.full((80, 160), np.inf, np.float32))
+    add_land(picture, view, pixel_rays(view, *SIZE))
+    land = np.isfinite(picture.depth)
+    depths, colours = picture.depth[land], picture.colour[land]
+    red, green, blue = colours[depths.argmin()]
+    assert red > green > blue
+    red, green, blue = colours[depths.argmax()]
+    assert green > red > blue
+
+
 def as_part(step):
     low, high = np.array(step.low), np.array(step.high)
     return Part("box", tuple(high - low), tuple((low + high) / 2), step.colour)

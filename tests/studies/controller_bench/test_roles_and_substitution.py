@@ -21,10 +21,12 @@ from cosim.studies.controller_bench.candidate import (
 )
 from cosim.studies.controller_bench.ranking import (
     RunKpis,
+    ScenarioKpis,
     compare_kpis,
     compare_values,
     is_current,
     merge_senses,
+    rank,
 )
 from cosim.studies.controller_bench.role import read_role, read_role_file, role_names
 from cosim.studies.controller_bench.substitution import ControllerSubstitution
@@ -290,6 +292,19 @@ def test_a_kpi_that_other_runs_lack_has_no_verdict():
         None,
     )
     assert (second.shipped, second.against_shipped) == (None, "")
+
+
+@pytest.mark.parametrize(
+    ("time", "other", "verdict"), [(8.0, 9.0, "above"), (9.0, 9.0, "equal"), (9.0, 8.0, "below")]
+)
+def test_a_single_goal_decides_between_controllers_that_meet_the_same_checks(time, other, verdict):
+    candidate, shipped = (
+        RunKpis({"landing.time": value, "landing.error": 0.1}, {}, {"landing.time": "lower"})
+        for value in (time, other)
+    )
+    checks = [{"kpi": "landing.error", "max": 0.2}]
+    ranking = rank([ScenarioKpis(candidate, shipped, checks)], ["landing.*"])
+    assert ranking.verdict == verdict
 
 
 def test_a_run_is_current_until_a_file_of_it_changes(tmp_path):

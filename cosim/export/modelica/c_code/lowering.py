@@ -184,7 +184,7 @@ class Lowering:
     def static_integer(self, node: Expression) -> int | None:
         """Evaluate an Integer expression of literals, size(), `+`, `-` and `*`.
 
-        Return None for all other expressions.
+        It may contain built-in functions of constants. Return None for all other expressions.
         """
         if isinstance(node, Literal) and node.type in ("Integer", "Enumeration"):
             return int(node.number)
