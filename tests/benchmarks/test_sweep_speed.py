@@ -13,6 +13,7 @@ from cosim.engine.plan_run import simulating
 from cosim.results import Result
 from cosim.results.kpi import evaluate_kpis
 from cosim.scenario import find_scenario, load, load_scenario
+from cosim.scenario.component_sources import FmuSource
 from cosim.studies.execution.job import Job, StudyContext
 from cosim.studies.execution.worker_pool import LocalRunner
 
@@ -43,18 +44,23 @@ class Sleeper(Fmi2Slave):
 """
 
 
+def key_of(number):
+    """Key of a run: hexadecimal digits."""
+    return f"{number + 1:04x}"
+
+
 def job(number):
-    return Job(str(number), {"/stop_time": 35.0, "uav.vtol.landing_time": 5.0 + 0.01 * number})
+    return Job(key_of(number), {"/stop_time": 35.0, "uav.vtol.landing_time": 5.0 + 0.01 * number})
 
 
 def prepared_files(scenario):
     root = load_scenario(scenario).root
-    paths = {
-        node.folder / node.spec.components[name].fmu
-        for node, name in root.leaves()
-        if node.spec.components[name].fmu
-    }
-    files = {path.resolve(): FmuFile(path) for path in paths}
+    files = {}
+    for node, name in root.leaves():
+        source = node.spec.components[name]
+        if isinstance(source, FmuSource):
+            path = (node.folder / source.fmu).resolve()
+            files[path] = FmuFile(path)
     for file in files.values():
         file.acquire()
     return files
@@ -109,11 +115,13 @@ def wall_time(context, workers, busy, count=8):
     """Return the wall time (s) of `count` runs of 1.2 s each."""
     with LocalRunner(context, workers) as runner:
         list(
-            runner.run_jobs([Job("first", {"sleeper.number": -1.0, "/stop_time": 0.01})] * workers)
+            runner.run_jobs(
+                [Job(key_of(-1), {"sleeper.number": -1.0, "/stop_time": 0.01})] * workers
+            )
         )
         start = perf_counter()
         jobs = [
-            Job(str(number), {"sleeper.number": number, "sleeper.busy": busy})
+            Job(key_of(number), {"sleeper.number": number, "sleeper.busy": busy})
             for number in range(count)
         ]
         assert not any(record.failure for record in runner.run_jobs(jobs))
