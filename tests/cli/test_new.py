@@ -183,7 +183,7 @@ def test_names_take_the_form_of_the_language(tmp_path, name, expected):
     assert new(tmp_path, name, "modelica", "--directory", "mine").returncode == 0
     text = (tmp_path / "mine" / expected).read_text()
     model = Path(expected).stem
-    assert text.startswith(f"block {model} ")
+    assert text.startswith(f"block {model}\n")
     assert text.endswith(f"end {model};\n")
 
 

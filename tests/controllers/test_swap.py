@@ -82,7 +82,7 @@ def test_a_check_of_a_kpi_that_is_left_out_is_not_met(tmp_path):
 @pytest.mark.long
 def test_a_modelica_fmu_with_the_variables_of_the_role_flies_demo1_box(tmp_path):
     (tmp_path / "Fleet").symlink_to(MODELICA / "Fleet")
-    text = (MODELICA / "ArDroneGeometric.mo").read_text().replace("ArDroneGeometric", "RoleOnly")
+    text = (MODELICA / "ArDroneCascaded.mo").read_text().replace("ArDroneCascaded", "RoleOnly")
     for declaration in EXTRA_OUTPUTS:
         assert f"output {declaration}" in text
         text = text.replace(f"output {declaration}", declaration)

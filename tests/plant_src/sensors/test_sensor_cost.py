@@ -62,7 +62,7 @@ def test_cost_of_a_step():
         (call,) = component.prepare_step_calls(clock, 0.01)
         costs = []
         for _ in range(ROUNDS):
-            component.begin()
+            component.initialise()
             costs.append(steps(call, clock))
         component.free()
         print(f"| {name} | {min(costs):.1f} |")

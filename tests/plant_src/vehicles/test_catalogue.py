@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from importlib import import_module
+from zipfile import ZipFile
 
+import numpy as np
 import pytest
 from fmpy import read_model_description
 
@@ -23,6 +26,38 @@ def test_the_fmu_has_the_variables_of_the_catalogue(name: str) -> None:
         expected |= dict.fromkeys(variable.scalar_names, variable.causality)
     found = {variable.name: variable.causality for variable in description.modelVariables}
     assert found == expected
+
+
+@ALL
+def test_the_fmu_has_the_start_values_and_limits_of_the_catalogue(name: str) -> None:
+    description = read_model_description(str(resources.root() / "fmus" / f"{name}.fmu"))
+    found = {
+        variable.name: tuple(
+            None if text is None else float(text)
+            for text in (variable.start, variable.min, variable.max)
+        )
+        for variable in description.modelVariables
+        if variable.causality == "parameter" and variable.type == "Real"
+    }
+    expected = {
+        scalar: (start, variable.minimum, variable.maximum)
+        for variable in MODELS[name].interface
+        if variable.causality == "parameter" and variable.type == "Float64"
+        for scalar, start in zip(variable.scalar_names, np.ravel(variable.start), strict=True)
+    }
+    assert found == expected
+
+
+@pytest.mark.parametrize("name", ["strider", "strider_6dof", "otter"])
+def test_the_fmu_has_the_compiled_functions_of_the_equations(name: str) -> None:
+    """Their names and the sizes of their arrays, with which the world calls them."""
+    pytest.importorskip("casadi")
+    equations = import_module(f"plant_src.vehicles.{name}.equations")
+    with ZipFile(resources.root() / "fmus" / f"{name}.fmu") as fmu:
+        compiled = fmu.read("sources/model.c").decode()
+    functions = compiled.partition("equations_functions[] =")[2]
+    assert "contact_correct" in functions
+    assert equations.block().files["model.c"].partition("equations_functions[] =")[2] == functions
 
 
 @ALL
