@@ -227,6 +227,7 @@ def test_a_restored_fmu_state_repeats_the_results_bit_for_bit(make_instances, pr
 def test_an_fmu_is_extracted_once_and_leaves_nothing_behind(
     make_instances, probe, tmp_path, monkeypatch
 ):
+    remove_idle_folders()  # those of earlier tests in this process
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", None)
     folder_counts = []
