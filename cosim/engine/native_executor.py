@@ -13,7 +13,7 @@ from .executor import Executor
 from .transfer_plan import Transfer, contiguous_views
 
 try:
-    from . import _native
+    import cosim.engine._native as _native
 except ImportError:  # installed without a C compiler
     _native = None  # type: ignore[assignment]  # a module cannot be declared optional
 

@@ -22,7 +22,7 @@ from .preflight.c_functions import function_prefix
 from .preflight.platforms import current_platform
 
 try:
-    from . import _logger
+    import cosim.components.fmi._logger as _logger
 except ImportError:  # installed without a C compiler: the text arrives unformatted
     _logger = None  # type: ignore[assignment]  # a module cannot be declared optional
 

@@ -31,14 +31,11 @@ def test_the_fmu_has_the_variables_of_the_catalogue(name: str) -> None:
 @ALL
 def test_the_fmu_has_the_start_values_and_limits_of_the_catalogue(name: str) -> None:
     description = read_model_description(str(resources.root() / "fmus" / f"{name}.fmu"))
-    found = {
-        variable.name: tuple(
-            None if text is None else float(text)
-            for text in (variable.start, variable.min, variable.max)
-        )
-        for variable in description.modelVariables
-        if variable.causality == "parameter" and variable.type == "Real"
-    }
+    found = {}
+    for variable in description.modelVariables:
+        if variable.causality == "parameter" and variable.type == "Real":
+            texts = (variable.start, variable.min, variable.max)
+            found[variable.name] = tuple(None if text is None else float(text) for text in texts)
     expected = {
         scalar: (start, variable.minimum, variable.maximum)
         for variable in MODELS[name].interface

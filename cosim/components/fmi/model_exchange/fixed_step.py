@@ -18,7 +18,7 @@ from ..library import GilReleasingFunction, as_pointer, function_address
 from .continuous_model import ContinuousModel, EventKind, IntegrationError, Integrator, StepEvent
 
 try:
-    from . import _fixed_step
+    import cosim.components.fmi.model_exchange._fixed_step as _fixed_step
 except ImportError:  # installed without a C compiler
     _fixed_step = None  # type: ignore[assignment]  # a module cannot be declared optional
 
